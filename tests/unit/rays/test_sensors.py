@@ -39,8 +39,8 @@ def flyer(*sensors, to=(0.0, 0.0, 0.0), autonomy=(), **rest):
     )
 
 
-def scan_of(sensor, seeds=(1,), **rest):
-    sim = Simulation(mission(flyer(sensor, **rest), scene=ROOM), seeds=list(seeds))
+def scan_of(sensor, seeds=(1,), compat="", **rest):
+    sim = Simulation(mission(flyer(sensor, **rest), scene=ROOM, compat=compat), seeds=list(seeds))
     sim.step()
     return sim.read("r.RayTrace.points")[0]
 
@@ -62,11 +62,13 @@ def test_the_pattern_of_a_lidar():
         ]
     )
     expected = ROOM.cast(np.zeros((3, 15)), ways.reshape(-1, 3).T, 22.0).distance.reshape(3, 5)
-    np.testing.assert_allclose(distance, np.where(expected <= 22, expected, 22.0), rtol=1e-12)
+    np.testing.assert_allclose(distance, np.where(expected <= 22, expected, np.inf), rtol=1e-12)
     assert (in_range == (expected <= 22)).all()
-    np.testing.assert_allclose(np.stack([x, y, z], axis=-1), ways * distance[..., None], atol=1e-12)
+    np.testing.assert_allclose(
+        np.stack([x, y, z], axis=-1), ways * np.minimum(distance, 22.0)[..., None], atol=1e-12
+    )
     assert distance[1].round(6).tolist() == [
-        22.0,
+        math.inf,
         round(9 * math.sqrt(2), 6),
         9.0,
         round(9 * math.sqrt(2), 6),
@@ -82,8 +84,17 @@ def test_a_mounted_lidar_measures_in_the_body_frame():
     assert scan[:, 0] == pytest.approx([0.0, 2.0, -5.0, 6.0, 1.0], abs=1e-12)
     turned = scan_of(RayTrace(num_rays_horiz=1, xyz=(1.0, 0.0, 0.0)), heading="90 deg")[0, 0]
     assert turned[:, 0] == pytest.approx([19.0, 0.0, 0.0, 18.0, 1.0], abs=1e-12)
-    near = scan_of(RayTrace(num_rays_horiz=1, min_range=9.5))[0, 0]
-    assert near[3:, 0].tolist() == [30.0, 0.0]
+
+
+@pytest.mark.parametrize(("compat", "near", "far"), [("", -math.inf, math.inf), ("scrimmage", 30.0, 30.0)])
+def test_what_is_too_near_differs_from_what_is_not_there(compat, near, far):
+    ends = {"num_rays_horiz": 1, "scan_period": 0.0}
+    scan = scan_of(RayTrace(min_range=9.5, **ends), compat=compat)[0, 0]
+    assert scan[:, 0].tolist() == [9.5 if not compat else 30.0, 0.0, 0.0, near, 0.0]
+    nothing = scan_of(RayTrace(max_range=8.5, **ends), compat=compat)[0, 0]
+    assert nothing[:, 0].tolist() == [8.5, 0.0, 0.0, min(far, 8.5) if compat else far, 0.0]
+    just = scan_of(RayTrace(min_range=9.0, max_range=9.0, **ends), compat=compat)[0, 0]
+    assert just[3:, 0].tolist() == [9.0, 1.0]
 
 
 def test_noise_and_lost_returns():
@@ -94,7 +105,7 @@ def test_noise_and_lost_returns():
     assert 1.0 - in_range.mean() == pytest.approx(0.25, abs=0.02)
     assert distance[in_range > 0].mean() == pytest.approx(9.0, abs=0.03)
     assert distance[in_range > 0].std() == pytest.approx(0.5, abs=0.02)
-    assert set(distance[in_range == 0]) == {30.0}
+    assert np.isnan(distance[in_range == 0]).all()
 
 
 class Hear(Autonomy):

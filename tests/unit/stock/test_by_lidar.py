@@ -16,11 +16,11 @@ WALL = Scene(walls=[Cuboid((40, 5, 0), (2, 40, 40))])
 LIDAR = RayTrace(num_rays_horiz=120, angle_res_horiz="3 deg", max_range=60.0, scan_period=0.0)
 
 
-def flown(scene, lidar=LIDAR, *, count=1, **law):
+def flown(scene, lidar=LIDAR, *, count=1, goal=(80.0, 0.0, 0.0), **law):
     """Paths, (T, worlds, count, 3), and the result, of flights over 80 m to the East."""
     block = Block(
         name="r", team=1, count=count, radius=0.5, sensor=lidar, motion=SingleIntegrator(),
-        autonomy=GoToByLidar(goal=(80.0, 0.0, 0.0), speed=10.0, **law),
+        autonomy=GoToByLidar(goal=goal, speed=10.0, **law),
     )  # fmt: skip
     game = mission(
         block, scene=scene, dt=0.1, end=20.0, interactions=[SceneCollision()], metrics=[Arrivals()]
@@ -55,6 +55,13 @@ def test_without_a_wall_it_flies_straight_and_one_that_sees_nothing_hits_the_wal
     assert blind.alive == {1: 0}
     assert blind.metrics["Arrivals"]["arrived"] == {1: 0}
     assert math.isnan(blind.metrics["Arrivals"]["mean_time"][1])
+
+
+def test_a_wall_nearer_than_the_least_range_is_not_flown_into():
+    # 0.9 m beside the start, and too near to be measured; the goal lies behind it.
+    beside = Scene(walls=[Cuboid((4.5, 2.0, 0.0), (13.0, 1.0, 40.0))])
+    _, result = flown(beside, LIDAR.replace(min_range=3.0), goal=(2.0, 30.0, 0.0))
+    assert result.alive == {1: 1}
 
 
 def test_it_slows_down_before_a_dead_end():

@@ -307,8 +307,10 @@ EXACT = {
 }
 
 
-def ranges(sensor, scene=None, steps=1, count=1, pos=(0.0, 0.0, 20.0)):
-    mission = Mission(blocks=[still("a", pos, count=count, sensor=sensor)], scene=scene or Scene())
+def ranges(sensor, scene=None, steps=1, count=1, pos=(0.0, 0.0, 20.0), **settings):
+    mission = Mission(
+        blocks=[still("a", pos, count=count, sensor=sensor)], scene=scene or Scene(), **settings
+    )
     sim = after(mission, steps)
     return [sim.read(f"a.LOSSensor.{name}")[0][0] for name in ("los_range", "los_sd", "is_in_range")]
 
@@ -317,8 +319,15 @@ def test_a_line_of_sight_has_the_length_of_height_over_sine():
     down = LOSSensor(**EXACT, rpy="0 30 0", xyz=(3.0, 0.0, 0.5))
     distance, _, is_in = ranges(down)
     assert (distance[0], is_in[0]) == (pytest.approx(41.0, abs=1e-12), 1.0)
-    for lost in (down.replace(rpy="0 -30 0"), down.replace(max_range=40.9), down.replace(min_range=41.1)):
+    for lost, told in (
+        (down.replace(rpy="0 -30 0"), math.inf),
+        (down.replace(max_range=40.9), math.inf),
+        (down.replace(max_range=40.9, oor_return=150.0), 150.0),
+        (down.replace(min_range=41.1), -math.inf),
+    ):
         distance, sd, is_in = ranges(lost)
+        assert (distance[0], sd[0], is_in[0]) == (told, 10.0, 0.0)
+        distance, sd, is_in = ranges(lost.replace(oor_return=150.0), compat="scrimmage")
         assert (distance[0], sd[0], is_in[0]) == (150.0, 10.0, 0.0)
     scene = Scene(
         ground=FlatGround(-5.0), walls=(Cuboid(center=(20.0, 0.0, 0.0), lengths=(2.0, 50.0, 50.0)),)
@@ -339,7 +348,7 @@ def test_a_line_of_sight_errs():
     assert is_share(len(errors), 0.3, 1000)
     assert is_spread(errors, 2.0)
     confused = LOSSensor(**{**EXACT, "probability_oor_error": 0.2}, rpy="0 90 0")
-    assert is_share((ranges(confused, count=1000)[0] == 150.0).sum(), 0.2, 1000)
+    assert is_share(np.isinf(ranges(confused, count=1000)[0]).sum(), 0.2, 1000)
     distance, _, _ = ranges(confused.replace(rpy="0 0 0"), count=1000)
     assert is_share((distance == 100.0).sum(), 0.2, 1000)
 

@@ -15,8 +15,9 @@ SLOW = 10.0
 class AvoidWalls(Autonomy):
     """Drives straight on, and turns away from walls that `RayTrace` sees within `avoid_distance`.
 
-    Each of these points repels with `avoid_distance` - range; the car drives slowly in the direction of the sum. If all rays of the scan
-    end near, it turns to its right. Potential fields: O. Khatib, IJRR 5 (1986), 90-98, with a linear law.
+    Each of these points repels with `avoid_distance` - range, those nearer than the lidar's `min_range` with `avoid_distance`. The car
+    drives slowly in the direction of the sum. If all rays of the scan end near, it turns to its right. Potential fields: O. Khatib,
+    IJRR 5 (1986), 90-98, with a linear law.
 
     In SCRIMMAGE a car that has slowed down never accelerates again.
     """
@@ -39,9 +40,12 @@ class AvoidWalls(Autonomy):
         """Choose heading and speed."""
         x, y, z, distance, in_range = self.points.data
         row, count = self.points.row, self.points.count
-        excess = self.avoid_distance[row] - distance
-        is_near = (in_range > 0.0) & (excess > 0.0)
-        weight = np.where(is_near & (distance > 0.0), -excess / np.where(distance > 0.0, distance, 1.0), 0.0)
+        too_near = distance == -np.inf
+        excess = self.avoid_distance[row] - np.where(too_near, 0.0, distance)
+        is_near = ((in_range > 0.0) | too_near) & (excess > 0.0)
+        length = np.where(too_near, np.sqrt(x * x + y * y + z * z), distance)
+        pushes = is_near & (length > 0.0)
+        weight = np.where(pushes, -excess, 0.0) / np.where(pushes, length, 1.0)
         push = self.points.sum(np.stack([weight * x, weight * y, weight * z]))
         n_near = self.points.sum(is_near)
         push[:, (n_near == count) & (count > 0)] = np.array([[0.0], [-1.0], [0.0]])

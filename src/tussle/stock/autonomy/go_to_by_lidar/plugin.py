@@ -64,10 +64,11 @@ class GoToByLidar(Autonomy):
 
     def _obstacles(self, g: GroupView) -> tuple[np.ndarray, np.ndarray]:
         """Return scan points at flight height, relative to their entities, (2, m) [m], and each entity's first one, (n + 1,)."""
-        x, y, z, _, in_range = self.points.data
+        x, y, z, distance, in_range = self.points.data
         row = self.points.row
         east, north, up = quat_rotate(g.quat[:, row], np.stack([x, y, z]))
-        kept = np.flatnonzero((in_range > 0.0) & (np.abs(up) < self.half_height[row]))
+        is_seen = (in_range > 0.0) | (distance == -np.inf)
+        kept = np.flatnonzero(is_seen & (np.abs(up) < self.half_height[row]))
         start = np.searchsorted(row[kept], np.arange(g.n + 1))
         return np.ascontiguousarray(np.stack([east[kept], north[kept]])), start.astype(np.int64)
 

@@ -17,8 +17,9 @@ class DepthCamera(Sensor):
     """Takes small images with a pinhole camera: depth, and a segmentation by parts of the scene and entities.
 
     One ray goes through the centre of each pixel. Pixels are listed row by row from the upper left corner of the image, so
-    `np.reshape(image, (..., img_height, img_width))` is the image. The depth is measured along the optical axis, not along the ray; it is
-    `max_range` where nothing is within `min_range` to `max_range`, and where a measurement is lost. A depth has an error with standard
+    `np.reshape(image, (..., img_height, img_width))` is the image. The depth is measured along the optical axis, not along the ray.
+    By REP 117 of ROS it is inf where nothing is within `max_range`, -inf where something is nearer than `min_range`, and nan where a
+    measurement is lost (`dropout`). A depth has an error with standard
     deviation `depth_noise` + `depth_noise_square` * depth^2; the second is that of a stereo camera.
 
     The segmentation has no errors: `kind` is 0 where nothing is within `max_range`, 1 for ground and hills, 2 for walls and buildings, 3
@@ -48,7 +49,12 @@ class DepthCamera(Sensor):
     depth_noise_square = Param(0.0, unit="1/m", ge=0.0, doc="Its increase with the square of the depth.")
     dropout = Param(0.0, ge=0.0, le=1.0, doc="Probability that the depth of a pixel is lost.")
     sees_entities = Param(True, structural=True, doc="Whether entities are in the images.")
-    depth = Output("depth_image", unit="m", ragged=True, doc="Depth of each pixel.")
+    depth = Output(
+        "depth_image",
+        unit="m",
+        ragged=True,
+        doc="Depth of each pixel; inf for nothing, -inf for too near, nan for lost.",
+    )
     segmentation = Output(
         "segmentation_image",
         fields="kind id team solid",
@@ -80,11 +86,12 @@ class DepthCamera(Sensor):
     def _depth(self, g: GroupView, depth: np.ndarray) -> np.ndarray:
         """Measured depths [m], from true ones, (n, k)."""
         k, least, most = depth.shape[1], self.min_range[:, None], self.max_range[:, None]
-        is_lost = ~((depth >= least) & (depth <= most))
+        is_near, is_far = depth < least, depth > most
         if self.depth_noise.any() or self.depth_noise_square.any():
-            true = np.where(is_lost, 0.0, depth)
+            true = np.where(is_near | is_far, 0.0, depth)
             sd = self.depth_noise[:, None] + self.depth_noise_square[:, None] * true * true
             depth = np.minimum(np.maximum(depth + sd * g.normal("depth", k).T, least), most)
+        depth = np.where(is_near, -math.inf, np.where(is_far, math.inf, depth))
         if self.dropout.any():
-            is_lost |= (g.uniform("dropout", k) < self.dropout).T
-        return np.asarray(np.where(is_lost, most, depth))
+            depth = np.where((g.uniform("dropout", k) < self.dropout).T, math.nan, depth)
+        return np.asarray(depth)

@@ -13,13 +13,13 @@ from tussle.numeric.quaternion import quat_from_euler, quat_multiply, quat_rotat
 class LOSSensor(Sensor):
     """Measures the range of the ground along a line of sight: a laser altimeter, if `rpy` turns it down.
 
-    The line begins at `xyz` on the body and points along its x axis, turned by `rpy`. Outside `min_range` to `max_range` the return is
-    `oor_return`; with the probability `probability_oor_error` a range counts as out of range, or one out of range as at the nearest limit.
-    A range has an error with standard deviation `range_sd_min` + `range_sd_per_unit` * range, and with `probability_of_error` another
-    one of `error_sd`.
+    The line begins at `xyz` on the body and points along its x axis, turned by `rpy`. The range is `oor_return` where nothing is
+    within `max_range`, and -inf where the ground is nearer than `min_range` (REP 117 of ROS). With the probability
+    `probability_oor_error` a range counts as beyond `max_range`, or one out of range as at the nearest limit. A range has an error
+    with standard deviation `range_sd_min` + `range_sd_per_unit` * range, and with `probability_of_error` another one of `error_sd`.
 
-    SCRIMMAGE uses the limits only if `probability_oor_error` is not 0, and does not repeat its draws. `use_flat_earth`
-    is true there by its file, which spells it otherwise.
+    In SCRIMMAGE `oor_return` is 150 m, and the range where the ground is too near. It uses the limits only if `probability_oor_error`
+    is not 0, and does not repeat its draws. `use_flat_earth` is true there by its file, which spells it otherwise.
     """
 
     grade = "portable"
@@ -40,7 +40,7 @@ class LOSSensor(Sensor):
     range_sd_min = Param(0.001, unit="m", ge=0.0, doc="Standard deviation at range 0.")
     range_sd_per_unit = Param(0.01, ge=0.0, doc="Increase of the standard deviation with the range.")
     range_sd_oor = Param(10.0, unit="m", ge=0.0, doc="Standard deviation that is reported out of range.")
-    oor_return = Param(150.0, unit="m", doc="Range that is reported out of range.")
+    oor_return = Param(math.inf, unit="m", doc="Range that is reported where nothing is within `max_range`.")
     probability_of_error = Param(0.05, ge=0.0, le=1.0, doc="Probability of an additional error.")
     error_sd = Param(0.5, unit="m", ge=0.0, doc="Standard deviation of the additional error.")
     probability_oor_error = Param(
@@ -49,7 +49,9 @@ class LOSSensor(Sensor):
     use_flat_earth = Param(
         True, structural=True, doc="See the plane z = 0 only; otherwise ground and walls of the scene."
     )
-    los_range = Output(unit="m", doc="Measured range.")
+    tells_near = True
+    """Whether a range below `min_range` is reported as -inf, not as `oor_return`."""
+    los_range = Output(unit="m", doc="Measured range; -inf where the ground is nearer than `min_range`.")
     los_sd = Output(unit="m", doc="Its standard deviation.")
     is_in_range = Output(doc="1 within the limits, otherwise 0.")
 
@@ -65,7 +67,8 @@ class LOSSensor(Sensor):
         )
         sd = self.range_sd_min + self.range_sd_per_unit * found
         found = self._limited(found + sd * noise[1])
-        self.los_range[:] = np.where(is_in, found, self.oor_return)
+        is_near = (true < self.min_range) if self.tells_near else np.zeros(g.n, bool)
+        self.los_range[:] = np.where(is_in, found, np.where(is_near, -math.inf, self.oor_return))
         self.los_sd[:] = np.where(is_in, sd, self.range_sd_oor)
         self.is_in_range[:] = is_in
 

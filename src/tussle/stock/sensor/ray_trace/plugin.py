@@ -21,12 +21,14 @@ class RayTrace(Sensor):
     """A lidar: measures distances along a pattern of rays, which end at the scene and at other entities.
 
     The rays of a scan spread evenly about the sensor's x axis: `num_rays_horiz` angles, `angle_res_horiz` apart, for each of
-    `num_rays_vert` elevations, from the highest down. The sensor is mounted at `xyz` on the body, turned by `rpy`. A ray that meets nothing
-    between `min_range` and `max_range`, or whose return is lost (`dropout`), ends at `max_range` and is not in range.
+    `num_rays_vert` elevations, from the highest down. The sensor is mounted at `xyz` on the body, turned by `rpy`.
 
-    SCRIMMAGE leaves the casting to BulletCollision, whose points are in the sensor's frame and begin at the body's centre
-    whatever `xyz` is; it reads a position noise and does not apply it. It calls the period `max_sample_rate`, which missions may
-    write too.
+    A ray that is not in range has a range by REP 117 of ROS: inf if it meets nothing within `max_range`, -inf if it meets something nearer
+    than `min_range`, nan if its return is lost (`dropout`). Its end is at `max_range`, or at `min_range` if its range is -inf.
+
+    In SCRIMMAGE all of these have the range `max_range`. It leaves the casting to BulletCollision, whose points are in the sensor's
+    frame and begin at the body's centre whatever `xyz` is; it reads a position noise and does not apply it. It calls the period
+    `max_sample_rate`, which missions may write too.
     """
 
     grade = "portable"
@@ -69,7 +71,7 @@ class RayTrace(Sensor):
         fields=FIELDS,
         unit=UNITS,
         ragged=True,
-        doc="Ends of the rays, body frame, and their ranges.",
+        doc="Ends of the rays, body frame, and their ranges: inf for nothing, -inf for too near, nan for lost.",
     )
     cloud = Publish(PointCloud, network="LocalNetwork")
     next_scan = State(default=-math.inf, unit="s", doc="Time of the next scan.")
@@ -137,12 +139,17 @@ class RayTrace(Sensor):
             distance = distance + (self.range_noise * g.normal("range", k))[:, rows].T.ravel()
         if self.dropout.any():
             distance = np.where(
-                (g.uniform("dropout", k) < self.dropout)[:, rows].T.ravel(), math.inf, distance
+                (g.uniform("dropout", k) < self.dropout)[:, rows].T.ravel(), math.nan, distance
             )
         axes = [
             quat_rotate(turn, np.repeat([[float(a == b)] for b in range(3)], m, axis=1)) for a in range(3)
         ]
         mount = np.ascontiguousarray(np.concatenate([self.xyz[:, rows], *axes]))
         scan = np.empty((5, m * k))
-        kernels.points(mount, pattern, distance, (self.min_range[rows], self.max_range[rows]), scan)
+        limits = self.min_range[rows], self.max_range[rows]
+        kernels.points(mount, pattern, distance, limits, self._near_end(rows), scan)
         return scan
+
+    def _near_end(self, rows: np.ndarray) -> np.ndarray:
+        """Distance along the rays at which those end that are nearer than `min_range` [m], (m,)."""
+        return self.min_range[rows]
