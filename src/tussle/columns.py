@@ -388,13 +388,18 @@ class Input(Channel):
 
 
 class Output(Channel):
-    """Values that this plugin writes for the other plugins of its entity; arguments as those of `Input`."""
+    """Values that this plugin writes for the other plugins of its entity; arguments as those of `Input`.
+
+    Args:
+        finite: Whether all values are finite; False for a range that is inf where nothing is. The conformance kit checks it.
+    """
 
     def __init__(
-        self, channels: str = "", unit: str = "", ragged: bool = False, fields: str = "", doc: str = ""
-    ) -> None:
+        self, channels: str = "", unit: str = "", ragged: bool = False, fields: str = "", doc: str = "", finite: bool = True,
+    ) -> None:  # fmt: skip
         super().__init__(channels, unit, ragged, fields, doc)
         self.default = 0.0
+        self.finite = finite
 
 
 class EntityRef(Numbers):

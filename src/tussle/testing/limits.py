@@ -118,7 +118,11 @@ def _not_finite(sim: Simulation) -> tuple[int, str]:
             for name in binding.ragged:
                 items = binding.plugin.__dict__[name]
                 bad = np.flatnonzero(~np.isfinite(np.atleast_2d(items.data)).all(axis=0))
-                if len(bad) and name in binding.writable:
+                if (
+                    len(bad)
+                    and name in binding.writable
+                    and getattr(type(binding.spec).columns[name], "finite", True)
+                ):
                     world = sim.state.population.bodies.world[group.first + int(items.row[bad[0]])]
                     text = f"an item of {'.'.join(binding.path)}.{name} is {items.data[..., bad[0]]}"
                     return int(world), text

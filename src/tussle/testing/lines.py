@@ -26,7 +26,7 @@ class Line:
         name: Owner and column, for messages.
         values: The line itself, (n,).
         world: World of each value, (n,).
-        is_made: Whether it is computed and starts with a finite number.
+        is_made: Whether it is computed, starts with a finite number and has to stay finite.
     """
 
     name: str
@@ -52,6 +52,7 @@ def lines_of(sim: Simulation) -> dict[Key, Line]:
 
     def add(table: Table, place: ColumnPlace, column: Column | None, name: str, world: np.ndarray) -> None:
         is_made = isinstance(column, (State, Output)) and bool(np.isfinite(column.default).all())
+        is_made = is_made and getattr(column, "finite", True)
         for key in keys_of(table, place):
             if key not in found or isinstance(column, Output):
                 found[key] = Line(name, table.arrays[place.dtype][key[2]], world, is_made)

@@ -76,11 +76,16 @@ def _made_lists(column: Channel, g: GroupView, number: float) -> tuple[np.ndarra
     return np.searchsorted(row, np.arange(g.n + 1)), items if column.fields else items[0]
 
 
+def extended_squash(data: np.ndarray) -> np.ndarray:
+    """`squash` for values that may be infinite, or nan, for a reason, such as the range of a ray that meets nothing."""
+    return squash(np.clip(np.nan_to_num(data, nan=0.5, posinf=np.inf, neginf=-np.inf), -1e300, 1e300))
+
+
 def row_signal(values: Any) -> np.ndarray:
     """A number per row that depends on all numbers of an input, (n,)."""
     if isinstance(values, RaggedColumn):
-        values = values.sum(squash(values.data))
-    return np.asarray(sum(squash(line) for line in np.atleast_2d(values)))
+        values = values.sum(extended_squash(values.data))
+    return np.asarray(sum(extended_squash(line) for line in np.atleast_2d(values)))
 
 
 def can_fill(message: type[Message]) -> bool:
@@ -120,9 +125,7 @@ def message_signal(batch: Messages) -> np.ndarray:
     for name, column in batch.type.fields.items():
         if isinstance(column, Field) and column.ragged:
             lists = batch.data[name]
-            total = total + row_signal(
-                lists.sum(squash(np.clip(lists.data, -1e300, 1e300)))
-            )  # inf may be a valid value
+            total = total + row_signal(lists.sum(extended_squash(lists.data)))
         elif isinstance(column, (Field, EntityRef)):
             for values in np.atleast_2d(batch.data[name]):
                 total = total + squash(values.astype(float))

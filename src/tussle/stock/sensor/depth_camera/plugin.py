@@ -54,6 +54,7 @@ class DepthCamera(Sensor):
         unit="m",
         ragged=True,
         doc="Depth of each pixel; inf for nothing, -inf for too near, nan for lost.",
+        finite=False,
     )
     segmentation = Output(
         "segmentation_image",

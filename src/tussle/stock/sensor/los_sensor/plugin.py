@@ -51,7 +51,7 @@ class LOSSensor(Sensor):
     )
     tells_near = True
     """Whether a range below `min_range` is reported as -inf, not as `oor_return`."""
-    los_range = Output(unit="m", doc="Measured range; -inf where the ground is nearer than `min_range`.")
+    los_range = Output(unit="m", doc="Measured range; inf for nothing, -inf for too near.", finite=False)
     los_sd = Output(unit="m", doc="Its standard deviation.")
     is_in_range = Output(doc="1 within the limits, otherwise 0.")
 

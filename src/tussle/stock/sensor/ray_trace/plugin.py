@@ -72,6 +72,7 @@ class RayTrace(Sensor):
         unit=UNITS,
         ragged=True,
         doc="Ends of the rays, body frame, and their ranges: inf for nothing, -inf for too near, nan for lost.",
+        finite=False,
     )
     cloud = Publish(PointCloud, network="LocalNetwork")
     next_scan = State(default=-math.inf, unit="s", doc="Time of the next scan.")
