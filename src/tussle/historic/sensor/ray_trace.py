@@ -12,7 +12,7 @@ class RayTrace(stock.RayTrace):
     """The range of a ray that is not in range is `max_range`, whatever the reason, and the ray ends there."""
 
     def _near_end(self, rows: np.ndarray) -> np.ndarray:
-        return self.max_range[rows]
+        return np.asarray(self.max_range[rows])
 
     def _scan(self, g: GroupView, rows: np.ndarray, pattern: np.ndarray) -> np.ndarray:
         scan = super()._scan(g, rows, pattern)

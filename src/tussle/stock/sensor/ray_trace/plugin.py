@@ -153,4 +153,4 @@ class RayTrace(Sensor):
 
     def _near_end(self, rows: np.ndarray) -> np.ndarray:
         """Distance along the rays at which those end that are nearer than `min_range` [m], (m,)."""
-        return self.min_range[rows]
+        return np.asarray(self.min_range[rows])
