@@ -5,7 +5,7 @@ from __future__ import annotations
 import platform
 import time
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -168,8 +168,7 @@ class _Stack:
         on_error = "record" if len(runs) == 1 else None  # by default, what raises ends the stack
         self.sim = Simulation(self.mission, [r.seed for r in runs], _by_path(runs), on_error=on_error)
         teams = [int(team) for team in self.sim.state.context.teams]
-        self._start = self._count()
-        self._note_alive(range(self.size), self._start, teams)
+        self._note_alive(range(self.size), self._count(), teams)
         return self.sim, teams
 
     def _count(self) -> np.ndarray:
@@ -211,7 +210,6 @@ class _Stack:
         self._cpu_begun[chosen] = self._cpu.total
         self.sim.reset(chosen, [r.seed for r in runs], _by_path(runs))
         begun = self._count()
-        self._start[chosen] = begun[chosen]
         self._note_alive(chosen, begun, teams)
 
     def _finished(self, world: int, run: BatchRun, teams: Sequence[int]) -> Finished:
@@ -221,11 +219,10 @@ class _Stack:
         alive = self._alive[world]
         if alive and result.t > alive[0][1]:
             alive += [(team, result.t, n) for team, n in result.alive.items()]
-        start = {team: int(n) for team, n in zip(teams, self._start[world], strict=True)}
         return Finished(
             run.number, result.end, result.t, result.steps,
             None if result.error else result.winner, result.state_hash, "" if result.error is None else _reported(result.error),
-            self._cpu.total - float(self._cpu_begun[world]), self._host, _metrics(result, start), alive,
+            self._cpu.total - float(self._cpu_begun[world]), self._host, _metrics(result), alive,
         )  # fmt: skip
 
 
@@ -234,10 +231,10 @@ def _by_path(runs: Sequence[BatchRun]) -> dict[str, list[Any]]:
     return {path: [run.params[path] for run in runs] for path in runs[0].params}
 
 
-def _metrics(result: WorldResult, start: Mapping[int, int]) -> list[tuple[int | None, str, float]]:
+def _metrics(result: WorldResult) -> list[tuple[int | None, str, float]]:
     """All metrics of a run, of teams and of the world."""
     out: list[tuple[int | None, str, float]] = []
-    for name, counts in (("score", result.scores), ("alive", result.alive), ("start", start)):
+    for name, counts in (("score", result.scores), ("alive", result.alive), ("start", result.born)):
         out += [(team, name, float(value)) for team, value in counts.items()]
     for plugin, named in result.metrics.items():
         for name, found in named.items():

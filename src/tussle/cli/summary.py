@@ -70,6 +70,7 @@ def show_summary(simulation: Simulation, name: str, speed: Speed, directory: Pat
         fact_list(
             [
                 ("ended", f"{end_text(result.end)}, at t = {result.t:g} s"),
+                *([("births", f"{result.waited} waited for a free position")] if result.waited else []),
                 *of_world,
                 ("speed", str(speed)),
                 ("grade", simulation.grade),
@@ -82,14 +83,23 @@ def show_summary(simulation: Simulation, name: str, speed: Speed, directory: Pat
 
 
 def team_tables(result: WorldResult, mission: Mission) -> list[Padding]:
-    """Return tables of the teams: names, number of entities at start and end, metrics, score."""
+    """Return tables of the teams: names, number of entities that were born and of those left, metrics, score."""
     columns, has_scores = list(_team_columns(result)), bool(result.scores)
-    head = ["team", "start", "left", *(name for name, _ in columns), *(["score", ""] if has_scores else [])]
+    planned = {team: sum(b.count for b in mission.blocks if b.team == team) for team in result.alive}
+    comes_later = any(b.rate for b in mission.blocks) or result.born != planned
+    head = [
+        "team",
+        "born" if comes_later else "start",
+        "left",
+        *(name for name, _ in columns),
+        *(["score", ""] if has_scores else []),
+    ]
     rows = []
     for team in sorted(result.alive):
         blocks = [b for b in mission.blocks if b.team == team]
         names = ", ".join(dict.fromkeys(b.name for b in blocks))
-        cells = [f"{team} {names}", str(sum(b.count for b in blocks)), str(result.alive[team])]
+        born, of = result.born[team], planned[team]
+        cells = [f"{team} {names}", f"{born} of {of}" if born < of else str(born), str(result.alive[team])]
         cells += [_number(values.get(team, "")) for _, values in columns]
         if has_scores:
             cells += [_number(result.scores.get(team, 0.0)), "won" if team == result.winner else ""]

@@ -103,16 +103,23 @@ def _create(state: SimulationState, due: Mapping[int, np.ndarray], at_start: boo
             raise error
         state.record_failure(world, state.error(world, str(error)))
 
-    occupancy = Occupancy(rejects, occupied, fail) if rejecting else None
+    occupancy = Occupancy(rejects, occupied, fail, step=state.context.clock.step) if rejecting else None
     state.world_view.begin()
     new, first = Bodies.empty(sum(map(len, due.values())), state.n_worlds), 0
+    is_there = np.ones(new.n, bool)
     for block, worlds in due.items():
         rows = slice(first, first := first + len(worlds))
         state.births.create(new, rows, block, worlds, occupancy=occupancy)
-        if rejecting:
+        if occupancy is not None:
+            for waiting in occupancy.waiting:
+                is_there[waiting] = False
             for world in np.unique(worlds):
-                placed.setdefault(int(world), []).append(new.pos[:, rows][:, worlds == world])
-    return in_order(new) if due else None
+                mine = (worlds == world) & is_there[rows]
+                placed.setdefault(int(world), []).append(new.pos[:, rows][:, mine])
+    if not is_there.all():
+        kept = np.flatnonzero(is_there)
+        new = Bodies(new.floats.take(kept, axis=1), new.ints.take(kept, axis=1), new.n_worlds)
+    return in_order(new) if new.n or (at_start and due) else None
 
 
 def spawn_due(state: SimulationState) -> None:

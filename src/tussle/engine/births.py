@@ -20,6 +20,8 @@ POSITION, HEADING = (np.uint64(stream_key("birth", label)) for label in ("positi
 VALUES = ("heading", "climb", "roll", "speed", "heading_variance", "health", "radius", "mass")
 MOST_TRIES = 10_000
 """Maximum number of attempts to find a free position for one entity."""
+TRIES_BEFORE_WAIT, TRIES_PER_STEP = 100, 10
+"""The same for an entity that may wait: when it is due, and in each later step."""
 
 
 @dataclass
@@ -33,6 +35,8 @@ class Occupancy:
         fail: Called with a world that has no free position, and the error.
         tries: World -> number of positions redrawn so far.
         full: Worlds without a free position.
+        step: Number of the next step of each world, (n_worlds,), which numbers the attempts of those that wait.
+        waiting: Rows of entities, of the new table, that wait for a free position, (m,) each.
     """
 
     rejects: Callable[[int, np.ndarray, np.ndarray], bool]
@@ -40,6 +44,8 @@ class Occupancy:
     fail: Callable[[int, MissionError], None]
     tries: dict[int, int] = field(default_factory=lambda: defaultdict(int))
     full: set[int] = field(default_factory=set)
+    step: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int64))
+    waiting: list[np.ndarray] = field(default_factory=list)
 
 
 def joined(parts: list[Bodies]) -> Bodies:
@@ -73,7 +79,11 @@ class Births:
         n_born: Entities born so far, (n_blocks, n_worlds).
         n_left: Number of future births of blocks with a rate, (n_blocks, n_worlds).
         next_time: Time of the next birth of each slot [s], per block (n_worlds, slots).
+        n_waiting: Births that are due and wait for a free position, part of `n_left`, (n_blocks, n_worlds).
+        n_waited: Births that have had to wait so far, (n_blocks, n_worlds).
     """
+
+    may_wait = True
 
     def __init__(self, overrides: Overrides, seeds: np.ndarray, start: float) -> None:
         self.overrides = overrides
@@ -84,6 +94,8 @@ class Births:
         self.next_id = np.ones(n_worlds, np.int64)
         self.n_born = np.zeros((n_blocks, n_worlds), np.int64)
         self.n_left = np.zeros((n_blocks, n_worlds), np.int64)
+        self.n_waiting, self.n_waited = np.zeros_like(self.n_left), np.zeros_like(self.n_left)
+        self._n_again = np.zeros_like(self.n_left)  # of those that are due now, the ones that have waited
         self.next_time = [
             np.full((n_worlds, b.slots if b.rate else 0), np.inf) for b in overrides.mission.blocks
         ]
@@ -93,7 +105,7 @@ class Births:
     def begin(self, worlds: np.ndarray) -> dict[int, np.ndarray]:
         """Reset worlds. Returns block number -> world of each initial entity."""
         self.next_id[worlds] = 1
-        self.n_born[:, worlds] = 0
+        self.n_born[:, worlds] = self.n_waiting[:, worlds] = self.n_waited[:, worlds] = 0
         due: dict[int, np.ndarray] = {}
         for i, block in enumerate(self.overrides.mission.blocks):
             if block.rate:
@@ -109,7 +121,7 @@ class Births:
         for i, block in enumerate(self.overrides.mission.blocks):
             if not block.rate or not self.n_left[i].any():
                 continue
-            parts = []
+            parts = [self._waiting(i, running)]
             for slot in range(block.slots):
                 n_in_step = 0  # more than one if the rate is above the step rate
                 while True:
@@ -120,7 +132,7 @@ class Births:
                     parts.append(worlds)
                     self.n_left[i, worlds] -= 1
                     wait = 1.0 / block.rate
-                    number = self.n_born[i, worlds] + n_in_step
+                    number = self.n_born[i, worlds] + self._n_again[i, worlds] + n_in_step
                     n_in_step += 1
                     seeds = self.seeds[worlds] ^ self.keys[i]
                     jitter = rng.normal(
@@ -130,9 +142,27 @@ class Births:
                     due_at = self.next_time[i][worlds, slot]
                     later = due_at + wait + block.interval_sd * jitter
                     self.next_time[i][worlds, slot] = np.where(later > due_at, later, due_at + wait)
-            if parts:
-                found[i] = np.sort(np.concatenate(parts), kind="stable")
+            worlds = np.sort(np.concatenate(parts), kind="stable")
+            if len(worlds):
+                found[i] = worlds
         return found
+
+    def _waiting(self, block: int, running: np.ndarray) -> np.ndarray:
+        """Worlds of the births of a block that have waited and are due again, (m,)."""
+        again = self._n_again[block]
+        again[:] = np.where(running, self.n_waiting[block], 0)
+        self.n_left[block] -= again
+        self.n_waiting[block] -= again
+        return np.repeat(np.arange(len(again)), again)
+
+    def _wait(self, block: int, worlds: np.ndarray) -> None:
+        """Take back the last births of a block, one per item of `worlds`, and let them wait."""
+        n = np.bincount(worlds, minlength=len(self.next_id))
+        self.next_id -= n
+        self.n_born[block] -= n
+        self.n_left[block] += n
+        self.n_waiting[block] += n
+        self.n_waited[block] += np.maximum(0, n - self._n_again[block])
 
     def space(self, n_alive: np.ndarray) -> np.ndarray:
         """Number of entities that plugins may spawn, besides those of the blocks, (n_worlds,).
@@ -182,7 +212,10 @@ class Births:
         )
         self._first_places(block, new.pos[:, mine])
         if "pos" not in where and occupancy is not None:
-            self._separate(block, worlds, new.block_index[mine], new.pos[:, mine], occupancy)
+            waiting = self._separate(block, worlds, new.block_index[mine], new.pos[:, mine], occupancy)
+            if len(waiting):
+                self._wait(block, worlds[waiting])
+                occupancy.waiting.append(mine.start + waiting)
         if spec.velocity is not None:
             new.vel[:, mine] = np.array(spec.velocity)[:, None]
         for name, values in where.items():
@@ -193,17 +226,22 @@ class Births:
 
     def _separate(
         self, block: int, worlds: np.ndarray, places: np.ndarray, pos: np.ndarray, occupancy: Occupancy
-    ) -> None:
-        """Redraw the positions that an interaction rejects, one entity after another, since each occupies space."""
+    ) -> np.ndarray:
+        """Redraw the positions that an interaction rejects, one entity after another, since each occupies space.
+
+        Returns the numbers of the entities that wait for a free position, the last ones of their worlds, (k,).
+        """
+        waiting = [np.zeros(0, np.int64)]
         for world in map(int, np.unique(worlds)):
             if world not in occupancy.full:
                 try:
-                    self._separate_world(
-                        block, world, np.flatnonzero(worlds == world), places, pos, occupancy
-                    )
+                    mine = np.flatnonzero(worlds == world)
+                    n_placed = self._separate_world(block, world, mine, places, pos, occupancy)
+                    waiting.append(mine[n_placed:])
                 except MissionError as error:
                     occupancy.full.add(world)
                     occupancy.fail(world, error)
+        return np.concatenate(waiting)
 
     def _separate_world(
         self,
@@ -213,17 +251,24 @@ class Births:
         places: np.ndarray,
         pos: np.ndarray,
         occupancy: Occupancy,
-    ) -> None:
+    ) -> int:
+        """Place entities of one world; returns the number of those that found a free position."""
         spec, most = self.overrides.mission.blocks[block], self.overrides.mission.limits.tries
+        waits = self.may_wait and spec.rate is not None and spec.without_space == "wait"
+        n_again = int(self._n_again[block, world]) if waits else 0
         before = occupancy.occupied(world)
         n = before.shape[1]
         taken = np.empty((3, n + len(mine)))
         taken[:, :n] = before
-        for i in mine:
-            attempt = 0
+        for number, i in enumerate(mine):
+            attempt, has_waited = 0, number < n_again
+            first = MOST_TRIES + TRIES_PER_STEP * int(occupancy.step[world]) if has_waited else 0
+            tries = TRIES_PER_STEP if has_waited else TRIES_BEFORE_WAIT
             while occupancy.rejects(world, pos[:, i], taken[:, :n]):
                 attempt += 1
                 occupancy.tries[world] += 1
+                if waits and (attempt > tries or occupancy.tries[world] > most):
+                    return number
                 if attempt > MOST_TRIES or occupancy.tries[world] > most:
                     others = f", and {most:,} in all" if occupancy.tries[world] > most else ""
                     raise MissionError(
@@ -232,7 +277,8 @@ class Births:
                     )
                 redrawn = np.empty(3)
                 seed = self.seeds[world] ^ self.keys[block]
-                kernels.scatter(seed, POSITION, places[i], attempt, *self._placing[block], redrawn)
+                kernels.scatter(seed, POSITION, places[i], first + attempt, *self._placing[block], redrawn)
                 pos[:, i] = redrawn
             taken[:, n] = pos[:, i]
             n += 1
+        return len(mine)

@@ -20,8 +20,10 @@ class HistoricBirths(Births):
     position; without SimpleCollision, they all start at one point. Each heading is drawn around the heading of the previous entity of
     the block. Positions [m] and headings [deg] are rounded to six decimals. The initial `speed` points East. A slot has at most one
     birth per step, and the time of its next birth is counted from the step, not from the due time. Placement "uniform", which
-    SCRIMMAGE no longer has, works as in tussle.
+    SCRIMMAGE no longer has, works as in tussle. A birth without a free position ends the game.
     """
+
+    may_wait = False
 
     def create(
         self,

@@ -19,6 +19,8 @@ class WorldResult:
         steps: Number of steps.
         t: Simulated time at the end [s].
         alive: Number of living entities, by team.
+        born: Number of entities that were born, by the team of their block.
+        waited: Number of births that had to wait for a free position.
         metrics: Name of a metric or interaction -> result name -> value, or {team: value}.
         scores: Sum of the scores of all metrics, by team.
         state_hash: Hash of the state at the end.
@@ -35,6 +37,8 @@ class WorldResult:
     scores: dict[int, float] = field(default_factory=dict)
     state_hash: str = ""
     error: Exception | None = None
+    born: dict[int, int] = field(default_factory=dict)
+    waited: int = 0
 
     @property
     def winner(self) -> int | None:
@@ -49,7 +53,9 @@ class WorldResult:
         return line("WorldResult", "", *self._facts())
 
     def _facts(self) -> tuple[str, ...]:
-        left = listing([f"team {team}: {n:,}" for team, n in self.alive.items()])
+        left = listing(
+            [f"team {team}: {n:,} of {self.born.get(team, n):,}" for team, n in self.alive.items()]
+        )
         scores = listing([f"team {team}: {number(float(score))}" for team, score in self.scores.items()])
         error = f"{type(self.error).__name__}: {self.error}" if self.error is not None else ""
         return (
@@ -59,11 +65,13 @@ class WorldResult:
 
     def _repr_html_(self) -> str:
         seed, end, t, _, _, error = self._facts()
-        teams = [(team, n, self.scores.get(team, "")) for team, n in self.alive.items()]
+        teams = [
+            (team, self.born.get(team, n), n, self.scores.get(team, "")) for team, n in self.alive.items()
+        ]
         values = (
             (f"{name}.{key}", value) for name, found in self.metrics.items() for key, value in found.items()
         )
         return page(
             f"World {self.world}", [seed, end, t, f"{self.steps:,} steps", error],
-            table(("team", "left", "score"), teams, MAX_TABLE // 2), table(("result", "value"), values, MAX_TABLE // 2),
+            table(("team", "born", "left", "score"), teams, MAX_TABLE // 2), table(("result", "value"), values, MAX_TABLE // 2),
         )  # fmt: skip

@@ -46,7 +46,16 @@ def snapshot(state: SimulationState) -> Snapshot:
         "failed": state.failed.copy(),
         "results": list(state.results),
         "parked": dict(state.parked),
-        "births": copy.deepcopy((births.next_id, births.n_born, births.n_left, births.next_time)),
+        "births": copy.deepcopy(
+            (
+                births.next_id,
+                births.n_born,
+                births.n_left,
+                births.next_time,
+                births.n_waiting,
+                births.n_waited,
+            )
+        ),
         "world_plugins": [r.copy() for r in state.world_bindings],
         "messages": state.message_bus.save(),
         "requested_births": list(state.world_view.births),
@@ -91,7 +100,9 @@ def restore(state: SimulationState, saved: Snapshot) -> None:
             binding.handles = {k: [None] * len(objects) for k, objects in saved_handles.items()}
         group.attach(population.bodies, first)
         _load_handles(state, group, handles)
-    births.next_id, births.n_born, births.n_left, births.next_time = copy.deepcopy(world["births"])
+    (
+        births.next_id, births.n_born, births.n_left, births.next_time, births.n_waiting, births.n_waited,
+    ) = copy.deepcopy(world["births"])  # fmt: skip
     clock = state.context.clock
     clock.step[:], clock.common = world["step"], world["common"]
     state.running[:], state.failed[:] = world["running"], world["failed"]
@@ -138,7 +149,8 @@ def hashed(state: SimulationState, world: int) -> Iterator[tuple[str, Any]]:
     yield "step", state.context.clock.step[world : world + 1]
     births = state.births
     counts = births.next_id[world : world + 1], births.n_born[:, world], births.n_left[:, world]
-    yield "births", np.concatenate(counts)
+    waits = births.n_waiting[:, world], births.n_waited[:, world]
+    yield "births", np.concatenate([*counts, *(waits if waits[1].any() else ())])
     for times in births.next_time:
         yield "births", times[world]
     for request in state.world_view.births:

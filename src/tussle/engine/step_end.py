@@ -155,6 +155,10 @@ def world_result(state: SimulationState, world: int, reason: str, is_hashed: boo
     clock = state.context.clock
     steps = int(clock.step[world])
     result = WorldResult(world, int(state.context.seeds[world]), reason, steps, float(clock.t[world]), alive)
+    result.born = dict.fromkeys(alive, 0)
+    for block, n in zip(state.mission.blocks, state.births.n_born[:, world], strict=True):
+        result.born[block.team] += int(n)
+    result.waited = int(state.births.n_waited[:, world].sum())
     scores: dict[int, float] = {}
     for world_binding in state.world_bindings:
         world_binding.view.begin(world_binding.plugin)

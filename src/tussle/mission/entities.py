@@ -310,6 +310,10 @@ class EntityReader:
             "slots": min(slots, max(1, count)),  # further slots would have no births
             "first_birth": fields.number("generate_start_time"),
             "interval_sd": fields.number("generate_time_variance"),
+            "without_space": fields.read(
+                "generate_without_space",
+                lambda text: BLOCK_VALUES["without_space"].convert(text, "generate_without_space"),
+            ),
         }
 
     def _motion(self, fields: Fields, taken: set[str]) -> Any:

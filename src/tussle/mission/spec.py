@@ -33,6 +33,7 @@ OF_WORLD = ("interactions", "metrics", "networks")
 """Names of the plugins of a block, and of a mission."""
 UPDATES = ("synchronous", "sequential")
 PLACEMENTS = ("normal", "uniform")
+WITHOUT_SPACE = ("wait", "fail")
 
 
 def _converted(where: str, frozen: Any, columns: Mapping[str, Param]) -> None:
@@ -151,6 +152,8 @@ class Block:
         slots: With a rate: number of birth sequences that run in parallel.
         first_birth: With a rate: time of the first birth [s].
         interval_sd: With a rate: standard deviation of the time between births [s].
+        without_space: With a rate: what a birth does that finds no free position. "wait": it tries again in each step; "fail": the
+            world ends with an error.
         autonomy: One or several autonomies.
         controller: One or several controllers, in order from the autonomy to the motion model.
         motion: The motion model.
@@ -179,6 +182,7 @@ class Block:
     slots: int = 1
     first_birth: float = 0.0
     interval_sd: float = 0.0
+    without_space: str = "wait"
     autonomy: Any = ()
     controller: Any = ()
     motion: Any = None
@@ -243,6 +247,7 @@ BLOCK_VALUES = _declared(
     slots={"gt": 0},
     first_birth={"unit": "s"},
     interval_sd={"unit": "s", "ge": 0.0},
+    without_space={"choices": WITHOUT_SPACE},
 )
 """Declarations of a block's values, like those of plugin parameters."""
 WORLD_VALUES = ("heading", "climb", "roll", "speed", "health", "radius", "mass")

@@ -203,6 +203,11 @@ ENTITY = {
     "generate_time_variance": TagSpec(
         "Standard deviation of the time between births.", "0", "s", bound=">= 0"
     ),
+    "generate_without_space": TagSpec(
+        "A birth that finds no free position may `wait`, and try again in each step, or `fail` and end the game (addition).",
+        "wait",
+        reads="text",
+    ),
     "autonomy": TagSpec("An autonomy; several run in the order of the file.", "none", reads="text"),
     "controller": TagSpec(
         "A controller; several are chained in the order of the file.", "none", reads="text"

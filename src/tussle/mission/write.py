@@ -47,6 +47,7 @@ TAGS = {
     "slots": "generate_count",
     "first_birth": "generate_start_time",
     "interval_sd": "generate_time_variance",
+    "without_space": "generate_without_space",
 }
 """Values of a block that are one tag each."""
 

@@ -8,9 +8,9 @@ from small_worlds import Drift, Reaper, Wander, alone, block, hashes, mission
 
 from tussle import Simulation
 from tussle.api import Autonomy, Interaction, Metric, Param, Publish, State
-from tussle.errors import MissionError, ParameterError, PluginError
+from tussle.errors import MissionError, ParameterError, PluginError, TussleError
 from tussle.messages import SpawnEntity
-from tussle.stock import SimpleCollision
+from tussle.stock import SimpleCollision, SingleIntegrator
 
 
 def ids(sim, name="a"):
@@ -206,6 +206,64 @@ def test_a_mission_too_crowded_says_so():
         match=r"block 'a': no free position for entity 2 of 2 after 10000 tries.*placement 'normal'",
     ):
         Simulation(mission(block(count=2), interactions=[SimpleCollision()]))
+
+
+GATE = {"position": (0.0, 0.0, 0.0), "variance": (0.0, 0.0, 0.0), "rate": 2.0, "count": 3}
+"""All are born at one place, two a second, and leave it at 1 m/s."""
+
+
+def gate(**changes):
+    """A game of three births at one place where entities keep 1.25 m between them."""
+    values = {"autonomy": Drift(to=(1.0, 0.0, 0.0)), "motion": SingleIntegrator(), **GATE, **changes}
+    leaver = block("a", **values)
+    return mission(
+        leaver,
+        interactions=[SimpleCollision(startup_collision_range=1.25, startup_collisions_only=True)],
+        dt=0.1,
+        end=4.0,
+    )
+
+
+def test_a_birth_without_a_free_position_waits():
+    alone = Simulation(gate(), seeds=[7])
+    n = []
+    while not alone.is_over:
+        alone.step()
+        n.append(int(alone.read("a.pos")[1].sum()))
+    # Each is at its place in the step after the one before has gone 1.25 m, at 1 m/s.
+    assert [n.index(k) for k in (1, 2, 3)] == [0, 13, 26]
+    (result,) = alone.result()
+    assert (result.born, result.alive, result.waited) == ({0: 3}, {0: 3}, 2)
+    for seeds, place in (([7], 0), ([1, 7, 3], 1)):
+        sim = Simulation(gate(), seeds=seeds)
+        sim.step(9)
+        saved = sim.snapshot()
+        sim.run()
+        assert sim.result()[place].state_hash == result.state_hash
+        sim.restore(saved)
+        sim.run()
+        assert sim.result()[place].state_hash == result.state_hash
+    sim.reset([0, 1, 2])
+    sim.run()
+    assert sim.result()[1].state_hash == result.state_hash
+
+
+def test_a_birth_that_never_finds_a_position_is_not_counted_as_a_loss():
+    sim = Simulation(gate(autonomy=Drift(to=(0.0, 0.0, 0.0))))
+    sim.run()
+    (result,) = sim.result()
+    assert (result.end, result.born, result.alive, result.waited) == ("time", {0: 1}, {0: 1}, 2)
+
+
+@pytest.mark.parametrize("changes", [{"without_space": "fail"}, {"rate": None}])
+def test_a_birth_without_a_free_position_may_end_the_game(changes):
+    with pytest.raises(TussleError, match="no free position for entity 2 of 3"):
+        Simulation(gate(**changes)).run()
+
+
+def test_with_the_laws_of_scrimmage_it_ends_the_game():
+    with pytest.raises(TussleError, match="no free position for entity 2 of 3"):
+        Simulation(gate().replace(compat="scrimmage")).run()
 
 
 def test_ids_are_never_used_again():
