@@ -62,7 +62,16 @@ ON_REGIONS = (
 """Those that cannot work without the boundaries that they name."""
 
 
-@pytest.mark.parametrize("name", {path: name for name, path in stock.manifest().items()}.values())
+SLOW = ("JSBSimCompiled", "JSBSimControl", "JSBSimModel")
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=pytest.mark.slow if name in SLOW else ())
+        for name in {path: name for name, path in stock.manifest().items()}.values()
+    ],
+)
 def test_plugin_meets_the_contract(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest
 ) -> None:

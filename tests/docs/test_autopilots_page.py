@@ -19,6 +19,7 @@ KINDS = {"ardupilot": ((9002, 9012), socket.SOCK_DGRAM), "px4": ((4560, 4561), s
 
 
 @pytest.mark.parametrize("which", KINDS)
+@pytest.mark.slow
 def test_what_the_page_tells_one_to_type_flies_two_multirotors(tmp_path, which):
     if which == "px4":
         pytest.importorskip("pymavlink")

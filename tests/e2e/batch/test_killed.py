@@ -201,6 +201,7 @@ def test_stopped_again_and_again_with_all_its_processes(folder):
     check_whole(folder)
 
 
+@pytest.mark.slow
 def test_a_process_that_plays_is_killed_while_another_command_comes(folder, monkeypatch):
     process = started(folder)
     assert wait_until(lambda: bytes_of_parts(folder) > 20_000, process)

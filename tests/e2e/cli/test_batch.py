@@ -320,6 +320,7 @@ def test_a_game_that_takes_longer_than_it_may_is_given_up(here):
     assert code == 2
 
 
+@pytest.mark.slow
 def test_a_plugin_that_kills_the_command_kills_it_only_once(process, folder):
     command = ("batch", "chance.xml", "how=crash", "--runs", 4, "--stack", 1, "--out", "out", *PLUGINS)
     process(*command, code=-signal.SIGSEGV)  # so few are played in the process itself

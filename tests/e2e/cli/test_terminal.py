@@ -8,6 +8,7 @@ import re
 import subprocess
 import termios
 
+import pytest
 from cli_process import COMMAND, environment
 
 ESCAPE = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]")
@@ -53,6 +54,7 @@ def test_colours_are_for_terminals_only(folder, process):
     assert "\x1b" not in process("run", "nothing.xml", code=1).stderr
 
 
+@pytest.mark.slow
 def test_the_first_run_ever_says_that_it_compiles_and_the_next_does_not(folder, monkeypatch):
     monkeypatch.setenv("TUSSLE_CACHE_DIR", str(folder / "kernels"))
     monkeypatch.setenv("NUMBA_OPT", "1")  # kernels that came with the package are of another kind

@@ -111,6 +111,7 @@ def test_a_light_aircraft_flies_as_in_jsbsim_for_a_minute():
     assert apart("c172p", {**START, "ic/h-sl-ft": 5000.0, "ic/vt-fps": 180.0}, 60.0, controls) < 1e-6
 
 
+@pytest.mark.slow
 def test_a_light_aircraft_flies_in_wind_as_in_jsbsim():
     assert apart("c172p", {**START, "ic/h-sl-ft": 5000.0, "ic/vt-fps": 180.0}, 60.0, in_wind) < 1e-6
 

@@ -36,6 +36,7 @@ def gusts_of(sim: Simulation) -> np.ndarray:
 
 
 @pytest.mark.parametrize("z", [60.0, 450.0, 1500.0])
+@pytest.mark.slow
 def test_gusts_have_the_variances_and_correlations_of_the_specification(z):
     n, steps = 3000, 30
     sim = hawks(n, z, gusts="dryden", gust_wind_speed=10.0, gust_deviation=1.2)

@@ -28,6 +28,7 @@ def cessna():
     return JSBSimCompiled(aircraft="c172p")
 
 
+@pytest.mark.slow
 def test_steady_flight_is_that_of_jsbsims_trim(cessna):
     import jsbsim
 

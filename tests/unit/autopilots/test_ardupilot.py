@@ -79,6 +79,7 @@ def test_a_multirotor_reaches_its_altitude_and_a_thousand_steps_give_the_same_bi
     assert hashes[0] == hashes[1]
 
 
+@pytest.mark.slow
 def test_a_fixed_wing_climbs_and_holds_its_heading():
     port = free_ports(2)
     plane = Block(

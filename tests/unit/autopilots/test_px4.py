@@ -113,6 +113,7 @@ class Px4Servant(Thread):
 # -- a closed loop --------------------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_multirotors_reach_their_altitudes_by_their_sensors_and_give_the_same_bits_twice():
     hashes = []
     for _ in range(2):

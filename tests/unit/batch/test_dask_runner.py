@@ -141,6 +141,7 @@ def walk(folder, line="", **more):
     return Batch(mission, plugin_files=[plugin], **{"runs": 1, "vary": ["fast=1,7,2,3"]} | more)
 
 
+@pytest.mark.slow
 def test_what_a_killed_worker_played_is_played_again_and_nothing_twice(cluster, client, tmp_path):
     batch = walk(tmp_path, "time.sleep(0.002)", runs=6)
     runs = [batch.run(i) for i in range(24)]
@@ -163,6 +164,7 @@ def test_what_a_killed_worker_played_is_played_again_and_nothing_twice(cluster, 
     assert {f.number: f.state_hash for f in finished} == {n: f.state_hash for n, f in alone.items()}
 
 
+@pytest.mark.slow
 def test_results_that_are_lost_with_their_worker_before_they_are_used_are_played_again(client, monkeypatch):
     batch, collect, killed = short_batch(2), _Playing._collect, []
 
@@ -180,6 +182,7 @@ def test_results_that_are_lost_with_their_worker_before_they_are_used_are_played
     assert killed[0] not in client.nthreads()
 
 
+@pytest.mark.slow
 def test_a_run_that_kills_its_workers_has_failed_and_takes_no_other_with_it(client, tmp_path):
     batch = walk(tmp_path, "if me.fast == 7.0: os.kill(os.getpid(), signal.SIGKILL)")
     results = batch.play(None, OnDask(client))
@@ -208,6 +211,7 @@ def wait_for(path):
     return path
 
 
+@pytest.mark.slow
 def test_a_scheduler_that_goes_away_ends_the_batch_and_what_was_finished_is_kept(tmp_path):
     batch = short_batch(6)
     scheduler = dask("scheduler", "--port", 0, "--scheduler-file", tmp_path / "where.json")
@@ -247,6 +251,7 @@ def test_without_workers_it_waits_only_so_long():
         assert time.monotonic() - began < 300.0
 
 
+@pytest.mark.slow
 def test_workers_that_come_later_play_and_threads_that_are_of_no_use_are_told_once():
     batch = short_batch(3)
     match = "2 threads are idle; start more workers of one thread each"
@@ -323,6 +328,7 @@ def run_script(cluster, *command):
 
 
 @pytest.mark.parametrize("is_file", [True, False], ids=["script", "prompt"])
+@pytest.mark.slow
 def test_plugins_of_a_script_or_prompt_travel(cluster, tmp_path, is_file):
     script, text = tmp_path / "sweep.py", SCRIPT.format(walker=WALKER, main="main()")
     script.write_text(text)
@@ -346,6 +352,7 @@ def test_a_package_that_workers_lack_is_named(client, tmp_path, monkeypatch):
 # -- what workers are -------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_worker_with_another_tussle_is_refused(tmp_path):
     copy = tmp_path / "tussle"
     shutil.copytree(Path(tussle.__file__).parent, copy, ignore=shutil.ignore_patterns("__pycache__"))
@@ -407,6 +414,7 @@ def test_an_asynchronous_client_is_refused(cluster):
         thread.submit(lambda: asyncio.run(give_it_one())).result()
 
 
+@pytest.mark.slow
 def test_without_dask_it_says_what_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
     match = r"distributed, which is not installed: pip install 'tussle\[cluster\]'"

@@ -68,6 +68,7 @@ def test_processes_find_what_this_process_finds():
     assert rows(batch.play(executor=Processes(2, 7))) == reference
 
 
+@pytest.mark.slow
 def test_a_run_that_kills_its_process_fails_and_the_others_are_there():
     points = [{"Trouble.how": how} for how in ("crash", "never")]
     batch = Batch(game(), runs=4, points=points)
@@ -198,6 +199,7 @@ if True:  # no guard
 """
 
 
+@pytest.mark.slow
 def test_a_script_can_define_plugins_and_needs_no_main_guard(tmp_path):
     script = run_script(tmp_path, "from tussle.batch import InProcess\n" + OWN + PLAY)
     try:

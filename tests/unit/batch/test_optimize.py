@@ -134,6 +134,7 @@ def test_values_that_were_played_are_not_played_again():
     assert len(study.ranking) == 3
 
 
+@pytest.mark.slow
 def test_processes_and_stacks_change_nothing():
     whole = facts(search(trials=16, runs=4))
     assert facts(search(trials=16, runs=4, executor=InProcess(3))) == whole
@@ -255,6 +256,7 @@ optimize(
 
 
 @pytest.mark.parametrize("sampler", ["tpe", "cmaes"])
+@pytest.mark.slow
 def test_a_search_that_was_killed_goes_on_as_if_it_had_not(game, sampler, monkeypatch):
     monkeypatch.chdir(game.parent)
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(p for p in sys.path if p)}

@@ -64,6 +64,7 @@ def test_a_slot_gives_birth_once_per_step_and_counts_from_there():
         assert found == counts
 
 
+@pytest.mark.slow
 def test_what_a_plugin_spawns_is_placed_as_it_says():
     clone = stock.Straight(generate_entities=True, template="b")
     flying = {"motion": stock.SimpleAircraft(), "controller": stock.SimpleAircraftControllerPID()}

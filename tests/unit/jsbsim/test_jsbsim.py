@@ -134,6 +134,7 @@ def test_the_autopilot_of_a_script_holds_bank_altitude_and_speed(tmp_path, monke
     assert capfd.readouterr() == ("", "")
 
 
+@pytest.mark.slow
 def test_controllers_fly_an_aircraft_by_its_surfaces():
     level = mission(
         JSBSimControl(aircraft="c172p", trim="longitudinal"), Straight(speed=50.0), JSBSimControlControllerHeadingPID(), end=20.0

@@ -114,6 +114,7 @@ def test_an_exception_of_jsbsim_ends_the_world_of_its_aircraft(monkeypatch):
         assert (sound.error, sim.steps[1]) == (None, 10)
 
 
+@pytest.mark.slow
 def test_aircraft_of_a_process_that_dies_fail_and_a_reset_starts_another():
     with Simulation(mission(2), [1, 2]) as sim:
         sim.step(40)
@@ -132,6 +133,7 @@ def test_aircraft_of_a_process_that_dies_fail_and_a_reset_starts_another():
         assert hashes(sim) == before
 
 
+@pytest.mark.slow
 def test_after_an_interrupted_step_no_answer_is_taken_for_another(monkeypatch):
     with Simulation(mission(2)) as sim:
         sim.step(20)
@@ -153,6 +155,7 @@ def interrupt(process):
     raise KeyboardInterrupt
 
 
+@pytest.mark.slow
 def test_processes_end_when_the_simulation_is_killed(tmp_path):
     script = tmp_path / "game.py"
     # Without `if __name__ == "__main__"`: the processes must not run the script again.

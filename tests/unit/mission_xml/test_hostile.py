@@ -115,6 +115,7 @@ def test_values_that_are_not_allowed(files, tags, inside, said):
         files.world(tags, inside)
 
 
+@pytest.mark.slow
 def test_large_files_are_read_when_allowed(files):
     text = "<runscript>" + "<x/>" * 150_000 + "<entity><count>300000</count></entity></runscript>"
     with pytest.raises(MissionError, match="allow_large"):

@@ -72,6 +72,7 @@ def test_the_games_on_regions_are_contested(name):
     assert sum(result.metrics["FlagCaptureMetrics"]["flags_taken"].values()) > 0
 
 
+@pytest.mark.slow
 def test_a_jammer_costs_a_convoy_vehicles():
     """Without a jammer the escorts hear of all raiders in time; with one the convoy halts in its range, and raiders get through."""
     mission = read_mission("convoy", {"end": "240"}, strict=True).mission
@@ -83,6 +84,7 @@ def test_a_jammer_costs_a_convoy_vehicles():
     assert raiders + 5 <= jammed_raiders
 
 
+@pytest.mark.slow
 def test_searchers_who_bid_their_whole_way_find_all_first():
     """Bids of the way to the area alone give most areas to one searcher."""
     left = {}
@@ -92,6 +94,7 @@ def test_searchers_who_bid_their_whole_way_find_all_first():
     assert left["path"] == 0 < 3 < left["nearest"]
 
 
+@pytest.mark.slow
 def test_a_survey_has_a_best_speed():
     """Slower finds less in the time, faster on the battery; energy over distance grows with the square of the speed."""
     mission = read_mission(
@@ -118,6 +121,7 @@ def test_cars_find_their_way_through_the_maze():
     assert farthest > -30.0
 
 
+@pytest.mark.slow
 def test_quadrotors_that_see_far_enough_to_brake_arrive():
     """At 8 m/s they need about 15 m to stop: who sees 5 m hits buildings."""
     mission = read_mission("urban_quadrotors", {"end": "45", "quadrotors": "3"}, strict=True).mission
@@ -128,6 +132,7 @@ def test_quadrotors_that_see_far_enough_to_brake_arrive():
     assert sum(blind.alive.values()) <= 2
 
 
+@pytest.mark.slow
 def test_strong_dozers_clear_more_than_weak_ones():
     """A crate holds against 490 N: with 1 kN a dozer halts before the third, with 8 kN it takes all along."""
     mission = read_mission("dozers", {"end": "30"}, strict=True).mission
@@ -149,6 +154,7 @@ def test_the_games_are_those_built_in_python(name):
     assert read.scores == built.scores
 
 
+@pytest.mark.slow
 def test_a_jet_and_compiled_aircraft_hold_their_courses():
     for name, speed, options in (("fixed_wing_6dof", 220.0, {}), ("straight_jsbsim", 24.0, {"count": "2"})):
         sim = Simulation(read_mission(name, {"end": "12", **options}, strict=True).mission, seeds=1)

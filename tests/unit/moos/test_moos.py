@@ -491,6 +491,7 @@ def test_a_flood_for_seconds_ends_its_world(database):
         threads[0].join()
 
 
+@pytest.mark.slow
 def test_ctrl_c_ends_a_run_that_waits_for_its_helm(database, tmp_path):
     file = tmp_path / "boat.xml"
     file.write_text(

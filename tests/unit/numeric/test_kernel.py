@@ -600,6 +600,7 @@ def test_edits_are_seen_and_only_what_changed_compiles(project):
     assert project() == [20.0, 1.25, 2.0, 3.0, 7.0, 0, 5]
 
 
+@pytest.mark.slow
 def test_processes_may_fill_the_cache_at_once(project):
     running = [project.start() for _ in range(3)]
     ended = [process.communicate() for process in running]
@@ -610,6 +611,7 @@ def test_processes_may_fill_the_cache_at_once(project):
     assert project() == [20.0, 1.5, 2.0, 3.0, 7.0, 0, 5]
 
 
+@pytest.mark.slow
 def test_same_names_from_files_of_different_processes_do_not_meet(project):
     # Each process counts its functions from 1, so both files hold symbols made of the same name and number.
     assert project("import law\nprint(law.make(2.0)(1.0))") == [2.0]
@@ -642,6 +644,7 @@ def test_a_tuple_of_arrays_is_one_argument():
         shared(own[0], out, 0)
 
 
+@pytest.mark.slow
 def test_without_jit_an_authors_kernels_run_as_python_with_the_same_bits():
     def played(**more):
         script = Path(__file__).with_name("kernels_in_python.py")

@@ -149,6 +149,7 @@ def cut(value, n):
     autoreset=st.sampled_from(["same_step", "next_step", "disabled"]),
     operations=st.lists(RESET | STEP | REFUSED, min_size=3, max_size=7),
 )
+@pytest.mark.slow
 def test_each_world_is_as_alone_after_any_resets(autoreset, operations):
     model = Model(Short(), autoreset)
     for operation, *given_ in operations:

@@ -18,6 +18,7 @@ def at_random(task):
 
 
 @pytest.mark.parametrize("name", TASKS)
+@pytest.mark.slow
 def test_rules_play_better_than_chance(name):
     task = getattr(rl, name)()
     by_rule, chance = evaluate(task, n_episodes=N), evaluate(task, at_random(task), N)

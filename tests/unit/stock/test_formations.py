@@ -69,6 +69,7 @@ def test_the_terrain_is_kept_clear_of():
         assert np.allclose(simulation.read("wing.HoldFormation.desired_altitude")[0], 70.0)
 
 
+@pytest.mark.slow
 def test_aircraft_hold_their_formations_over_hills():
     mission = read_mission(
         "formation_flight", {"leaders": 5, "wings": 30, "end": 300, "spacing": 25}, strict=True

@@ -94,6 +94,7 @@ def test_every_vehicle_that_can_stop_visits_all_points_and_stops_at_the_last():
         assert sim.read(f"{name}.pos")[0][0, 0] == pytest.approx(ROUTE[2], abs=0.05), name
 
 
+@pytest.mark.slow
 def test_vehicles_that_cannot_stop_fly_round_and_round():
     blocks = [
         traveller(name, *parts, mode="loop", speed=15.0, tolerance=40.0) for name, parts in FLYING_ON.items()

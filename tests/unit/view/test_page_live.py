@@ -78,6 +78,7 @@ def test_closing_all_browsers_leaves_the_game_going(game):
     assert page.publisher.n_made - made <= 1, "nobody watches, and yet frames are made"
 
 
+@pytest.mark.slow
 def test_a_browser_that_hangs_holds_up_nobody_and_costs_no_memory():
     crowd = Block(name="all", count=20_000, placement="uniform", half_width=(500, 500, 100), motion=Still())
     with (
