@@ -24,7 +24,7 @@ from tussle import Block, Mission, Simulation
 from tussle.errors import ParameterError, PluginError
 from tussle.mission import read_mission
 from tussle.scene import Scene
-from tussle.stock import ArduPilot, DirectController, FixedWing6DOFRascal, Multirotor
+from tussle.stock import ArduPilot, DirectController, FixedWing6DOFRascal, GroundCollision, Multirotor
 
 MOTORS = " ".join(f"[ motor_{i} {i} 1000 2000 346.41 1200 1 ]" for i in range(4))
 PLANE = Path(__file__).with_name("plane_peer.py")
@@ -77,6 +77,52 @@ def test_a_multirotor_reaches_its_altitude_and_a_thousand_steps_give_the_same_bi
         assert np.abs(pos - (3.0, -4.0, 40.0)).max() < 0.3
         hashes.append(result.state_hash)
     assert hashes[0] == hashes[1]
+
+
+class StrictPilot:
+    """Arms only where it has been at rest on the ground, level, for a second; climbs to 2 m, comes down, and disarms where it rests."""
+
+    def __init__(self):
+        self.phase, self.since, self.highest = "start", None, 0.0
+
+    def __call__(self, port, data):
+        state = json.loads(data)
+        t, (down, fall) = state["timestamp"], (state["position"][2], state["velocity"][2])
+        imu = state["imu"]
+        is_at_rest = (
+            max(map(abs, [*imu["gyro"], *state["velocity"]])) < 1e-3
+            and max(abs(a - b) for a, b in zip(imu["accel_body"], (0.0, 0.0, -9.81), strict=True)) < 0.02
+        )
+        if self.phase in ("start", "descent"):
+            self.since = (self.since if self.since is not None else t) if is_at_rest else None
+            if self.since is not None and t - self.since > 1.0:
+                self.phase = {"start": "climb", "descent": "disarmed"}[self.phase]
+                self.since = None
+        self.highest = max(self.highest, -down)
+        if self.phase == "climb" and -down > 2.0:
+            self.phase = "descent"
+        rate = {"climb": 1.0, "descent": -0.5}.get(self.phase)
+        # Armed motors idle at 1050; what is left of the climb to the wanted rate sets the thrust.
+        pulse = 1000 if rate is None else 1557 + 300 * (rate + fall)
+        return [round(min(2000, max(1050 if rate is not None else 1000, pulse)))] * 4 + [1000] * 12
+
+
+@pytest.mark.parametrize(("dt", "roll"), [(0.0025, 0.0), (0.01, 0.0), (0.0025, 0.1)])
+def test_it_arms_at_rest_takes_off_and_lands(dt, roll):
+    port, pilot = free_ports(), StrictPilot()
+    ground = GroundCollision(enable_startup_collisions=False, remove_on_collision=False)
+    block = {"position": (3.0, -4.0, 0.0), "variance": (0, 0, 0), "roll": roll}
+    lowest = 0.0
+    with (
+        JsonServant(port, act=pilot),
+        Simulation(copter(port, block=block, dt=dt, end=20.0).replace(interactions=[ground])) as sim,
+    ):
+        while not sim.is_over:
+            sim.step()
+            lowest = min(lowest, sim.read("copter.pos")[0][0, 0, 2])
+    assert pilot.phase == "disarmed"
+    assert pilot.highest > 2.0
+    assert lowest > -1e-3
 
 
 @pytest.mark.slow

@@ -1,4 +1,4 @@
-"""GroundCollision bears the weight that each motion model has by its own law."""
+"""GroundCollision bears the weight that each motion model has by its own law, and stops what falls and slides."""
 
 import re
 
@@ -9,7 +9,15 @@ from pages import FENCE, ROOT
 from tussle import Block, Mission, Simulation, historic, stock
 from tussle.api import Autonomy, Interaction, MotionModel, Output, Param, State
 from tussle.mission import read_mission
-from tussle.stock import UUV6DOF, Ballistic, Multirotor, RigidBody6DOF, SimpleCar
+from tussle.stock import (
+    UUV6DOF,
+    Ballistic,
+    FixedWing6DOFRascal,
+    FreeBody,
+    Multirotor,
+    RigidBody6DOF,
+    SimpleCar,
+)
 
 MASS, GRAVITY, BLOCK_MASS = 3.51, 3.71, 0.22
 """With 3.51 kg or 0.22 kg and 9.81 m/s^2, weight over mass is rounded to more than gravity, so that it lifts the body."""
@@ -174,6 +182,112 @@ def test_a_vehicle_that_floats_is_not_held_down_and_one_in_water_weighs_less():
     assert np.abs(heights(heavy, ground())).max() < 1e-6
 
 
+# -- contact ----------------------------------------------------------------------------------------------------------------------
+
+
+FALLING = [
+    Ballistic(),
+    FreeBody(),
+    Multirotor(omega_min=0.0),
+    FixedWing6DOFRascal(use_ground_model=False),
+    SimpleCar(enable_gravity=True),
+]
+
+
+@pytest.mark.parametrize("model", FALLING, ids=lambda m: type(m).__name__)
+@pytest.mark.parametrize("dt", [0.0025, 0.03, 0.1])
+def test_what_falls_lands_and_rests(model, dt):
+    """From many heights and speeds at once: wherever the last step before the ground begins."""
+    rng = np.random.default_rng(1)
+    blocks = [
+        resting(model, name=f"b{i}", position=(0, 0, rng.uniform(0, 6)), velocity=(0, 0, rng.uniform(-9, 3)))
+        for i in range(12)
+    ]
+    sim = Simulation(Mission(blocks=blocks, dt=dt, end=5.0, interactions=[ground()]))
+    lowest = 0.0
+    while not sim.is_over:
+        sim.step()
+        height = np.concatenate([sim.read(f"b{i}.pos")[0][0, :, 2] for i in range(12)])
+        lowest = min(lowest, height.min())
+    # What only gravity accelerates is stopped exactly. The drag of the others is not known in the step of the landing.
+    assert lowest > -(1e-9 if isinstance(model, (Ballistic, FreeBody, SimpleCar)) else 20.0 * dt * dt)
+    assert np.abs(height).max() <= 1e-5
+    speed = np.concatenate([sim.read(f"b{i}.vel")[0][0] for i in range(12)])
+    assert np.abs(speed).max() < 1e-4
+
+
+@pytest.mark.parametrize("model", [Ballistic(), FreeBody()], ids=lambda m: type(m).__name__)
+@pytest.mark.parametrize("friction", [0.2, 1.0])
+def test_what_slides_is_stopped_by_friction(model, friction):
+    block = resting(model, velocity=(3.0, 4.0, 0.0))
+    sim = Simulation(Mission(blocks=[block], dt=0.01, end=6.0, interactions=[ground(friction=friction)]))
+    sim.run()
+    pos = sim.read("a.pos")[0][0, 0]
+    way = 25.0 / (2.0 * friction * 9.81)
+    assert pos == pytest.approx([0.6 * way, 0.8 * way, 0.0], abs=0.06)
+
+
+def test_without_friction_it_slides_on():
+    sim = Simulation(
+        Mission(
+            blocks=[resting(Ballistic(), velocity=(3, 0, 0))],
+            dt=0.1,
+            end=2.0,
+            interactions=[ground(friction=0.0)],
+        )
+    )
+    sim.run()
+    assert sim.read("a.pos")[0][0, 0] == pytest.approx([6.0, 0.0, 0.0], abs=1e-9)
+
+
+class Lift(Autonomy):
+    """Increases the thrust of the rotors within a second to a share of the weight."""
+
+    share = Param(0.0)
+    motors = Output("motor_0 motor_1 motor_2 motor_3", unit="rad/s")
+
+    def step(self, g):
+        self.motors[:] = np.sqrt(self.share * np.minimum(1.0, g.t) * 1.5 * 9.81 / 4.0 / 5.45e-6)
+
+
+@pytest.mark.parametrize(("share", "leaves"), [(0.0, False), (0.2, False), (0.9, False), (1.1, True)])
+def test_a_copter_leaves_the_ground_with_more_thrust_than_its_weight(share, leaves):
+    found = heights(resting(Multirotor(omega_min=0.0), autonomy=Lift(share=share)), ground(), dt=0.02)
+    assert found.min() >= -1e-6
+    assert np.abs(found[: 30 if leaves else None]).max() < 2e-3
+    if leaves:
+        assert found[-1] > 0.1
+    else:
+        assert np.abs(found[-20:]).max() <= 1e-6
+
+
+def test_a_body_that_lands_aslant_levels_and_one_that_turns_stops():
+    block = resting(FreeBody(), position=(0, 0, 1), roll=0.4, climb=-0.2, radius=0.3)
+    sim = Simulation(Mission(blocks=[block], dt=0.01, end=5.0, interactions=[ground()]))
+    sim.run()
+    _, x, y, _ = sim.read("a.quat")[0][0, 0]
+    assert abs(x) + abs(y) < 1e-3
+    assert np.abs(sim.read("a.omega")[0]).max() < 1e-3
+
+
+@pytest.mark.parametrize("update", ["synchronous", "sequential"])
+def test_contact_is_the_same_alone_in_a_stack_and_after_a_restore(update):
+    blocks = [
+        resting(model, name=f"b{i}", position=(9 * i, 0, 2), velocity=(1, 0, -2))
+        for i, model in enumerate(FALLING)
+    ]
+    game = Mission(blocks=blocks, dt=0.05, end=2.0, interactions=[ground()], update=update)
+    (alone,) = Simulation(game, seeds=[3]).run()
+    sim = Simulation(game, seeds=[1, 3])
+    sim.step(17)
+    saved = sim.snapshot()
+    sim.run()
+    assert sim.result()[1].state_hash == alone.state_hash
+    sim.restore(saved)
+    sim.run()
+    assert sim.result()[1].state_hash == alone.state_hash
+
+
 # -- the missions of the page on autopilots ----------------------------------------------------------------------------------------
 
 
@@ -183,7 +297,7 @@ STANDING = [f[2] for f in FENCE.finditer(PAGE) if f[1] == "xml" and "GroundColli
 
 @pytest.mark.parametrize("text", STANDING, ids=["ArduPilot", "PX4"])
 def test_the_copters_of_the_page_on_autopilots_stand_on_the_ground(text, tmp_path):
-    """With its rotors at their lowest speed, which bear a fifth of its weight, a copter hops, but does not sink."""
+    """With its rotors at their lowest speed, which bear a fifth of its weight."""
     text = re.sub(r"<(autonomy|controller).*?</\1>", "", text, flags=re.DOTALL)
     path = tmp_path / "copter.xml"
     path.write_text(text)
@@ -192,11 +306,12 @@ def test_the_copters_of_the_page_on_autopilots_stand_on_the_ground(text, tmp_pat
     rest = resting(copter.motion).autonomy
     game = mission.replace(blocks=[copter.replace(autonomy=rest, name="a")], end=10.0)
     sim = Simulation(game)
-    lowest = 0.0
+    heights = []
     while not sim.is_over:
-        sim.step(40)
-        lowest = min(lowest, sim.read("a.pos")[0][0, 0, 2])
-    assert lowest > -0.2
+        sim.step()
+        heights.append(sim.read("a.pos")[0][0, 0, 2])
+    assert np.abs(heights).max() < 1e-3
+    assert np.abs(heights[100:]).max() <= 1e-6
 
 
 # -- SCRIMMAGE ------------------------------------------------------------------------------------------------------------------

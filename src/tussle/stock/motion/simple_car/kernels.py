@@ -18,8 +18,7 @@ def driven(x, y, z, z_rate, yaw, speed, steering, length, max_velocity, enable_g
     v = clamp(speed, 0.0, max_velocity)
     rate = v * tan(clamp(steering, -STEERING_MAX, STEERING_MAX)) / length
     east, north = arc(yaw, rate * dt)
-    is_carried = (z_rate < 0.0) & (force_z >= mass * GRAVITY)  # by the ground, into which it does not sink
-    begin = z_rate if enable_gravity and not is_carried else 0.0
+    begin = z_rate if enable_gravity else 0.0
     end = begin + (force_z / mass - GRAVITY) * dt if enable_gravity else 0.0
     pos = x + v * dt * east, y + v * dt * north, z + 0.5 * dt * (begin + end)
     yaw_1 = yaw + rate * dt
