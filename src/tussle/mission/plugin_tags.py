@@ -232,9 +232,22 @@ class PluginReader:
         tag = next((tag for tag, known in KINDS.items() if known is column.kind), "behaviors")
         made = [
             self.make(PluginTag(tag, name, attributes, lambda _: place), taken, depth + 1)
-            for name, attributes in codecs.inline_plugins(text)
+            for name, attributes in self._inline(text, place)
         ]
         return [plugin for plugin in made if plugin is not None]
+
+    def _inline(self, text: str, place: Place) -> list[codecs.InlinePlugin]:
+        """Parse the plugins in a parameter, also with quotes that do not match."""
+        try:
+            return codecs.inline_plugins(text)
+        except MissionError as error:
+            try:
+                found = codecs.inline_plugins_by_blanks(text)
+                repaired = " ".join(codecs.inline_text(*plugin) for plugin in found)
+            except TussleError:
+                raise error from None
+            self.problems.mended(place, str(error), repaired)
+            return found
 
     def _not_a_parameter(self, written: PluginTag, cls: type[Plugin], attribute: str) -> None:
         viewer, place, known = historic()["viewer"], written.where(attribute), cls.historic_attributes

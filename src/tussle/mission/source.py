@@ -176,7 +176,7 @@ class SourceReader:
             self.placeholders.setdefault(name, default)
             self.places.setdefault(name, []).extend(replaced.places[name])
         self.files.append(path)
-        return parse(replaced.text, str(path), self.budget, replaced.line_of), replaced.text
+        return parse(replaced.text, str(path), self.budget, replaced.line_of, self.problems)
 
     def _include_all(self, node: Node, inside: list[Path], roots: list[Path]) -> None:
         """Replace each include below a node by the tags that it includes."""

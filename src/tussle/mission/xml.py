@@ -283,7 +283,7 @@ class _WorldReader:
         # A wrong value has been reported and is replaced by its default.
         dt, start, end = fields.number("dt"), fields.number("start"), fields.number("end")
         most = self.limits.substeps
-        substeps = fields.read("motion_multiplier", lambda text: codecs.integer(text, 1, most))
+        substeps = fields.read("motion_multiplier", lambda text: self._whole(fields, text, most))
         if not abs((end - start) / dt) <= self.limits.steps:
             text = f"there are more than {self.limits.steps:,} steps of {dt:g} s from {start:g} to {end:g} s"
             self.problems.error(fields.place("end"), text)
@@ -295,6 +295,17 @@ class _WorldReader:
             )
         update = fields.read("update", lambda text: MISSION_VALUES["update"].convert(text, "update"))
         return {"dt": dt, "start": start, "end": end, "motion_multiplier": substeps, "update": update}
+
+    def _whole(self, fields: Fields, text: str, most: int) -> int:
+        """Return motion_multiplier, the whole part of a number with a fraction."""
+        value = codecs.number(text)
+        if value < 1.0 or value == int(value):
+            return codecs.integer(text, 1, most)
+        whole = codecs.integer(str(int(value)), 1, most)
+        self.problems.mended(
+            fields.place("motion_multiplier"), f"motion_multiplier: {shown(text)} is not a whole number", f'motion_multiplier="{whole}"'
+        )  # fmt: skip
+        return whole
 
     def _origin(self) -> Origin:
         names = ("latitude_origin", "longitude_origin", "altitude_origin")
