@@ -207,13 +207,14 @@ def parse(
     try:
         return _parsed(text, file, budget, line_of), text
     except _MalformedError as error:
+        first = str(error)
         mended, changes = mend(text) if problems is not None else (text, [])
         if problems is None or not changes:
-            raise MissionError(str(error)) from None
+            raise MissionError(first) from None
     try:
         root = _parsed(mended, file, budget, line_of)
-    except _MalformedError as error:
-        raise MissionError(str(error)) from None
+    except _MalformedError as error:  # one of the two is the cause
+        raise MissionError("\n".join(dict.fromkeys((first, str(error))))) from None
     for line, why, repaired in changes:
         problems.mended(Place(file, line_of(line)), f"this is not well-formed XML: {why}", repaired)
     return root, mended

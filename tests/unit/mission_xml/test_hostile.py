@@ -34,7 +34,7 @@ def soon():
         ("<runscript>", "not well-formed XML: no element found"),
         ("<runscript><entity></runscript>", "mismatched tag"),
         ("<runscript/><runscript/>", "junk after document element"),
-        ("<runscript>\n\n&nope;</runscript>", r"m\.xml:3: this is not well-formed XML: undefined entity"),
+        ("<runscript>\n\n&nope;</runscript>", r"m\.xml:3: this is not well-formed XML: & is not written &amp;"),
         ("<runscript a='1' a='2'/>", "duplicate attribute"),
         ("<x:runscript/>", "unbound prefix"),
         ("<runscript>\x00</runscript>", "not well-formed"),
