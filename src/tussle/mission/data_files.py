@@ -7,6 +7,9 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePath
 
+from tussle.errors import MissingFileError
+from tussle.texts import shown
+
 VARIABLE = "SCRIMMAGE_DATA_PATH"
 """Environment variable with folders of data, separated as in PATH, which SCRIMMAGE's users have."""
 
@@ -14,7 +17,7 @@ VARIABLE = "SCRIMMAGE_DATA_PATH"
 def data_folders(search: Iterable[str | Path]) -> list[Path]:
     """Return the folders of data: those given, then those of the environment."""
     named = os.environ.get(VARIABLE, "").split(os.pathsep)
-    return [Path(folder).expanduser() for folder in (*search, *filter(None, named))]
+    return [Path(os.path.expanduser(folder)) for folder in (*search, *filter(None, named))]  # noqa: PTH111
 
 
 @dataclass(frozen=True)
@@ -29,15 +32,16 @@ class DataFiles:
     beside: Path
     folders: Sequence[Path]
 
-    def find(self, name: str) -> Path | None:
-        """Return the file that a mission names; None if there is none.
+    def find(self, name: str) -> Path:
+        """Return the file that a mission names.
 
         That is the path itself, else the file beside the mission, else that of a folder of data which ends with this path, else with
         this file name. Of several in one folder it is the least deep, and then the first in the order of the alphabet.
+
+        Raises:
+            MissingFileError: There is none.
         """
-        if not name or "\0" in name:
-            return None
-        path = Path(name).expanduser() if name.startswith("~") else Path(name)
+        path = Path(os.path.expanduser(name.replace("\0", "")))  # noqa: PTH111
         for direct in (path, self.beside / path, *(folder / path for folder in self.folders)):
             if direct.is_file():
                 return direct.absolute()
@@ -46,11 +50,14 @@ class DataFiles:
                 same = [file for file in _named(folder, path.name) if file.parts[-len(parts) :] == parts]
                 if same:
                     return folder.absolute() / min(same, key=lambda file: (len(file.parts), file))
-        return None
+        where = ", ".join(map(str, self.folders)) or "a folder of data"
+        raise MissingFileError(
+            f"there is no file {shown(name)} beside the mission or in {where}; --data-path DIR (search=[DIR]) or the environment "
+            f"variable {VARIABLE} names the folder that has it"
+        )
 
 
 def _named(folder: Path, name: str) -> list[PurePath]:
-    """Paths of the files of this name below a folder."""
-    return [
-        PurePath(root, name).relative_to(folder) for root, _, names in os.walk(folder) if name in names
-    ]
+    """Paths of the files of this name below a folder, from there."""
+    found = (root for root, _, names in os.walk(folder) if name in names)
+    return [PurePath(root, name).relative_to(folder) for root in found]

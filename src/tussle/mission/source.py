@@ -244,7 +244,7 @@ class SourceReader:
         if found:
             raise MissionError(
                 f"{place}: {shown(base + href)} lies outside the mission's folder and the search paths, so it is not included; "
-                f"add its folder to the search paths"
+                f"--data-path DIR (search=[DIR]) adds a folder to these"
             )
         raise MissionError(f"{place}: there is no file {shown(base + href)} to include")
 

@@ -13,6 +13,7 @@ from tussle.errors import MissionError, ParameterError, TussleError
 from tussle.geodesy import Origin
 from tussle.mission import codecs
 from tussle.mission.catalogue import KINDS, Catalogue
+from tussle.mission.data_files import DataFiles, data_folders
 from tussle.mission.effects import check_effects
 from tussle.mission.entities import EntityReader, Fields, block_names, expand_entity_common
 from tussle.mission.laws import check_compat
@@ -102,7 +103,8 @@ def read_mission(
         strict: Unknown tags and attributes are errors, else they are ignored with a note; None: they are errors, unless the file has
             marks of a mission of SCRIMMAGE: its style sheet, compat="scrimmage", or tags that only SCRIMMAGE uses, such as <log_dir>.
         plugin_files: Python files with further plugins for the mission.
-        search: Folders that are searched for missions and included files, besides the mission's own.
+        search: Folders that are searched for missions, included files, and files that plugins name (data of SCRIMMAGE), besides the
+            mission's own. Those of the environment variable SCRIMMAGE_DATA_PATH are searched after them.
         allow_large: Raise the limits that keep a hostile file from taking all memory, for reading and for running.
         compat: As for `Mission`; None for the value in the file.
         checks_effects: It is an error if an override has no effect, since its placeholder stands only in what is ignored. For this
@@ -112,6 +114,7 @@ def read_mission(
         MissionError: The mission cannot be read or is invalid. The message has one line for each error, with file and line.
     """
     limits = Limits.large() if allow_large else Limits()
+    search = data_folders(search)
 
     def read(given: Mapping[str, Any]) -> Loaded:
         return _read(source, given, strict, plugin_files, search, limits, compat)
@@ -202,7 +205,10 @@ class _WorldReader:
             problems.error(root.place, "the mission has no <entity>")
         times = self._run()
         origin = self._origin()
-        plugins = PluginReader(self.catalogue, problems, self.budget, self._shared(), origin.from_geodetic)
+        find = DataFiles(self.folders[0], self.folders[1:]).find
+        plugins = PluginReader(
+            self.catalogue, problems, self.budget, find, self._shared(), origin.from_geodetic
+        )
         world = self._world_plugins(plugins)
         scene = SceneReader(root, self.folders, origin, problems)
         entities = EntityReader(plugins, problems, origin, self.limits, times["update"], scene.mesh_lengths)
@@ -210,6 +216,8 @@ class _WorldReader:
         self._count_tags(nodes)
         blocks = [entities.block(node, name) for node, name in zip(nodes, block_names(nodes), strict=True)]
         plugins.report_unread()
+        if plugins.has_found:
+            self.source.text = root.to_text()
         conditions, seed, reseed = self._end_conditions(), self._seed(), self._reseed()
         parts = scene.parts()
         self._settings()
