@@ -31,6 +31,10 @@ class MissionError(TussleError, ValueError):
     """A mission is invalid; the message begins with file and line if it was read from a file."""
 
 
+class MissingFileError(MissionError):
+    """A file that a mission names is in none of the folders that are searched."""
+
+
 class SnapshotError(TussleError):
     """A snapshot cannot be taken, or does not fit the simulation it is restored into."""
 

@@ -20,10 +20,10 @@ Part = tuple[str, str, str]
 """A component of a value: its name, its SI unit, and the unit of a bare number."""
 
 
-def shown(text: str) -> str:
+def shown(text: str, longest: int = LONGEST_SHOWN) -> str:
     """Quote external text for a message, on one line and shortened."""
     flat = " ".join(text.split())
-    return repr(flat if len(flat) <= LONGEST_SHOWN else flat[:LONGEST_SHOWN] + "...")
+    return repr(flat if len(flat) <= longest else flat[:longest] + "...")
 
 
 def truth(text: str) -> bool:

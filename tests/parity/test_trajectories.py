@@ -72,6 +72,18 @@ def test_an_aircraft_with_surfaces_flies_as_recorded() -> None:
     assert max(flight.turn.values()) <= 1e-10
 
 
+def test_aircraft_that_avoid_each_other_fly_as_recorded_until_rounding_shows() -> None:
+    """80 aircraft fly for 26 s within 1e-6 m. Then small differences grow to 1e-5 m in 7 s, and decide who begins to avoid whom.
+
+    The 24 losses, and when each was lost, are those of the recording to the end.
+    """
+    recording = load("straight-vs-motorschemas")
+    flight = fly(mission("straight-vs-motorschemas").replace(compat="scrimmage"), recording)
+    assert max(error for frame, error in flight.error.items() if frame <= 264) <= LIMIT
+    assert flight.last_frame == recording.last_frame
+    counts_alike(flight, recording)
+
+
 def test_cars_drive_and_stop_as_recorded() -> None:
     """Two lots of cars, each at one point, where the forces of BulletCollision hold them from the second step to the end."""
     recording = load("colliding_spheres")

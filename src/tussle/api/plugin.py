@@ -6,6 +6,7 @@ import inspect
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any, ClassVar, Self, TypeVar
 
 import numpy as np
@@ -292,6 +293,29 @@ class Plugin:
         if own["active_in"]:
             parts.append(f"states={', '.join(own['active_in'])!r}")
         return f"{type(self).__name__}({', '.join(parts)})"
+
+    # -- outside of tussle ----------------------------------------------------------------------------------------------
+
+    awaits: ClassVar[str] = ""
+    """Program or device that the plugin needs, for `tussle check`; {NAME} stands for a parameter."""
+
+    @classmethod
+    def with_files(cls, given: Mapping[str, str], find: Callable[[str], Path]) -> dict[str, str]:
+        """Return attributes of a mission's tag that say where the files are that it names; by default none.
+
+        Args:
+            given: The attributes as written.
+            find: Returns a file by its name or path. It raises a MissingFileError.
+
+        Raises:
+            TussleError: A file is missing or wrong.
+        """
+        return {}
+
+    @property
+    def awaited(self) -> str:
+        """The program or device that this instance needs; "" for none."""
+        return self.awaits.format_map(self.values)
 
     # -- bound ----------------------------------------------------------------------------------------------------------
 

@@ -23,7 +23,7 @@ def read_ranges(text: str, file: str) -> tuple[list[Variable], list[str]]:
         ParameterError: It is no XML, or a mission.
     """
     try:
-        root = parse(text, file, Budget(Limits()))
+        root, _ = parse(text, file, Budget(Limits()))
     except MissionError as error:
         raise ParameterError(str(error)) from None
     if root.tag == "runscript":

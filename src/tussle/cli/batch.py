@@ -122,6 +122,7 @@ def batch_of(options: BatchOptions) -> Batch:
         strict=options.strict,
         allow_large=options.allow_large,
         compat=options.compat,
+        search=list(map(str, options.data_path)),
     )
     if options.end is not None:
         ending_by_time(made.mission)
@@ -182,6 +183,7 @@ def record_run(
         number,
         may_run=lambda code: digest(code.files) == digest(planned.plugin_files),
         allow_large=options.allow_large,
+        search=options.data_path,
     )
     with (
         simulate(run.loaded, run.mission, run.seed) as simulation,

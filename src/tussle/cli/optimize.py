@@ -52,6 +52,7 @@ def optimize(options: OptimizeOptions) -> int:
         strict=options.strict,
         allow_large=options.allow_large,
         compat=options.compat,
+        search=list(map(str, options.data_path)),
     )
     show_notes(optimization.evaluator.corners.loaded)
     directory = options.directory or optimization.default_directory()
@@ -134,6 +135,7 @@ def play_again(options: OptimizeOptions, study: Study) -> str:
     words += [] if options.strict is None else ["--strict" if options.strict else "--lenient"]
     words += [word for path in options.plugin_files for word in ("--plugin-path", str(path))]
     words += ["--allow-large"] if options.allow_large else []
+    words += [word for path in options.data_path for word in ("--data-path", str(path))]
     words += ["--compat", options.compat] if options.compat is not None else []
     words += ["--seed", str(study.info["first_seed"] + study.info["runs"]), "-n", str(RUNS_AGAIN)]
     return shlex.join(words)

@@ -158,7 +158,7 @@ class PluginOptions:
 
 @dataclass(frozen=True, kw_only=True)
 class MissionOptions(PluginOptions):
-    """Check a mission: read it, build its game, and report all errors."""
+    """Check a mission: read it, build its game, and report all errors. Of a folder, check all missions and show a table."""
 
     mission: Annotated[
         str,
@@ -201,6 +201,16 @@ class MissionOptions(PluginOptions):
         option("LAWS", "Play by other laws than tussle's: scrimmage, for SCRIMMAGE's own where they differ."),
     ] = None
 
+    data_path: Annotated[
+        list[Path],
+        option(
+            "DIR",
+            "A folder of data, such as SCRIMMAGE's: aircraft, scripts, maps, terrains that the mission names. Can be repeated; "
+            "SCRIMMAGE_DATA_PATH names further ones.",
+            "--data-path",
+        ),
+    ] = field(default_factory=list)
+
     def __post_init__(self) -> None:
         read_settings([*self.settings, *self.more])
 
@@ -214,7 +224,9 @@ class MissionOptions(PluginOptions):
         end = {} if self.end is None else {"run.end": read_time("--end", self.end)}
         return read_settings([*self.settings, *self.more]) | end
 
-    def read(self, *, shows_viewer_notes: bool = False) -> tuple[Loaded, Mission, int]:
+    def read(
+        self, *, shows_viewer_notes: bool = False, shows_notes: bool = True
+    ) -> tuple[Loaded, Mission, int]:
         """Return the mission file as read, the mission, and the seed; print the notes.
 
         Raises:
@@ -229,8 +241,10 @@ class MissionOptions(PluginOptions):
             plugin_files=tuple(self.plugin_files),
             allow_large=self.allow_large,
             compat=self.compat,
+            search=self.data_path,
         )
-        show_notes(loaded, shows_viewer_notes)
+        if shows_notes:
+            show_notes(loaded, shows_viewer_notes)
         seed = self.seed if self.seed is not None else loaded.seed if loaded.seed is not None else 1
         return loaded, loaded.mission if self.end is None else ending_by_time(loaded.mission), seed
 

@@ -8,8 +8,10 @@ import re
 import shlex
 import sys
 import time
+from collections import Counter
 from collections.abc import Callable
 from contextlib import ExitStack, suppress
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -22,10 +24,11 @@ from tussle.cli.options import MissionOptions
 from tussle.cli.play_options import ConvertOptions, RunOptions
 from tussle.cli.progress import ProgressMeter, compiling
 from tussle.cli.summary import Speed, show_summary
-from tussle.cli.terminal import out, say, say_note
+from tussle.cli.tables import text_table
+from tussle.cli.terminal import OK, WRONG_INPUT, out, say, say_note
 from tussle.displays import counted
 from tussle.engine.simulation import Simulation
-from tussle.errors import BatchError, MissionError, ParameterError, RecordError, WiringError
+from tussle.errors import BatchError, MissionError, ParameterError, RecordError, TussleError, WiringError
 from tussle.mission import Loaded, Mission, to_python, to_xml
 
 if TYPE_CHECKING:
@@ -33,6 +36,9 @@ if TYPE_CHECKING:
     from tussle.batch.trust import DirectoryCode
     from tussle.record import Recorder
 
+SEARCHED = 10_000
+"""Bytes at the beginning of a file in which its root tag is searched."""
+STATES = {"plays": "can be played", "waits": "wait for a program or a device", "refused": "are refused"}
 NAP = 0.05  # [s] longest sleep of a paced run, so that Ctrl-C is handled in time
 
 
@@ -70,13 +76,68 @@ def record(
     )  # fmt: skip
 
 
-def check(options: MissionOptions) -> None:
-    """Build the game of a mission and show its size."""
+def check(options: MissionOptions) -> int:
+    """Build the game of a mission and show its size; of a folder, build all its missions and show which can be played.
+
+    Returns:
+        The exit code.
+    """
+    if Path(options.mission).is_dir():
+        return check_folder(options)
     loaded, mission, seed = options.read(shows_viewer_notes=True)
     with compiling(), simulate(loaded, mission, seed) as simulation:
         n = counted(sum(block.count for block in mission.blocks), "entity", "entities")
         notes = f", {counted(len(loaded.notes), 'note')}" if loaded.notes else ""
         out().print(f"{options.mission} can be played: {n}, grade {simulation.grade}{notes}", soft_wrap=True)
+        for needed in awaited(mission):
+            out().print(f"it waits for {needed}", soft_wrap=True)
+    return OK
+
+
+def check_folder(options: MissionOptions) -> int:
+    """Build the games of all missions of a folder and show which can be played, which wait for what, and which are refused and why.
+
+    Returns:
+        The exit code: an error if some are refused.
+
+    Raises:
+        MissionError: The folder has no missions.
+    """
+    files = [path for path in sorted(Path(options.mission).rglob("*.xml")) if is_mission(path)]
+    if not files:
+        raise MissionError(f"{options.mission} has no mission file, an .xml whose root tag is <runscript>")
+    counts, shown = Counter[str](), text_table("mission", "", "waits for, or why it is refused")
+    for path in files:
+        folders = [*options.data_path, Path(options.mission)]  # missions of a folder may include each other
+        state, why = state_of(replace(options, mission=str(path), data_path=folders))
+        counts[state] += 1
+        shown.add_row(str(path.relative_to(options.mission)), state, why)
+    out().print(shown)
+    out().print(", ".join(f"{counts[state]} {words}" for state, words in STATES.items()), f"of {len(files)}")
+    return WRONG_INPUT if counts["refused"] else OK
+
+
+def state_of(options: MissionOptions) -> tuple[str, str]:
+    """Return a key of STATES for a mission, and what it waits for or why it is refused."""
+    try:
+        loaded, mission, seed = options.read(shows_notes=False)
+        with simulate(loaded, mission, seed):
+            needed = "; ".join(awaited(mission))
+    except TussleError as error:
+        return "refused", str(error).removeprefix(f"{options.mission}:")
+    return ("waits", needed) if needed else ("plays", "")
+
+
+def is_mission(path: Path) -> bool:
+    """Return whether a file seems to be a mission, by its beginning."""
+    with path.open("rb") as file:
+        return b"<runscript" in file.read(SEARCHED)
+
+
+def awaited(mission: Mission) -> list[str]:
+    """The programs and devices outside of tussle that a mission needs."""
+    plugins = (each for plugin in mission.plugins for each in plugin.walk())
+    return list(dict.fromkeys(filter(None, (plugin.awaited for plugin in plugins))))
 
 
 def convert(options: ConvertOptions) -> None:
@@ -232,6 +293,7 @@ def planned_by(options: RunOptions) -> PlannedRun:
         int(number),
         may_run=lambda code: _may_run(code, options.trust),
         allow_large=options.allow_large,
+        search=options.data_path,
     )
 
 

@@ -98,11 +98,20 @@ class Catalogue:
             AbsentPluginError: It is a plugin of SCRIMMAGE that tussle does not have yet.
             MissionError: There is no such plugin, or it cannot be imported.
         """
+        name = self.present_name(name)
         if name not in self._sources:
             if name in historic()["plugins"]["names"]:
                 kind, _, why = missing()[name].partition(": ")
                 raise AbsentPluginError(
                     f"{name} is {'dropped' if kind == 'dropped' else 'not in tussle yet'}: {why}"
+                )
+            if now := historic()["replaced"].get(name):
+                raise MissionError(
+                    f"{name} is a plugin of former versions of SCRIMMAGE; {now} is the nearest one now"
+                )
+            if name in historic()["nowhere"]["names"]:
+                raise AbsentPluginError(
+                    f"{name} is nowhere: SCRIMMAGE does not have it either; --plugin-path FILE adds yours"
                 )
             raise MissionError(
                 f"there is no plugin {name[:80]!r}{nearest_name(name[:80], self.names)}; `tussle plugins` lists them, "
@@ -117,6 +126,10 @@ class Catalogue:
         if not (isinstance(found, type) and issubclass(found, Plugin)):
             raise MissionError(f"plugin {name!r} {source.place} is {found!r}, which is not a plugin class")
         return found
+
+    def present_name(self, name: str) -> str:
+        """Return the name of the plugin that has the law of this former one; the same name for all others."""
+        return name if name in self._sources else historic()["former"].get(name, name)
 
     def adapter(self, cls: type[Plugin], name: str) -> type[Plugin]:
         """Return the plugin that runs a class or a function of a plugin file.
@@ -140,7 +153,10 @@ class Catalogue:
         )
 
     def hides(self, name: str) -> str:
-        """Return a note on which of several plugins with this name is used; "" if there is only one."""
+        """Return a note on which of several plugins with this name is used, or on its present name; "" if there is only one."""
+        now = self.present_name(name)
+        if now != name:
+            return f"{name} is the former name of {now}"
         *others, winner = (f"the one {source.place}" for source in self._sources[name])
         return f"{name} is {winner}; it hides {' and '.join(others)}" if others else ""
 

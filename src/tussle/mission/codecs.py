@@ -113,6 +113,23 @@ def inline_plugins(text: str) -> list[InlinePlugin]:
     return found
 
 
+def inline_plugins_by_blanks(text: str) -> list[InlinePlugin]:
+    """Parse the plugins in a parameter as SCRIMMAGE does: blanks separate the attributes, and quotes are dropped wherever they are.
+
+    Raises:
+        ParameterError: There is text outside the brackets, or a bracket is not closed.
+        MissionError: A plugin has no name, or something else than key=value after it.
+    """
+    found = []
+    for row in texts.rows(text):
+        words = row.split()
+        pairs = [word.split("=") for word in words[1:]]
+        if not words or not all(len(pair) == 2 and pair[0] for pair in pairs):
+            raise MissionError(f"{shown(row)} is not allowed; it takes NAME key='value' ...")
+        found.append(InlinePlugin(words[0], {key: re.sub("['\"]", "", value) for key, value in pairs}))
+    return found
+
+
 def word_rows(text: str, fields: Sequence[str]) -> list[dict[str, str]]:
     """Parse rows of words, one per field: "[ a b ] [ c d ]".
 

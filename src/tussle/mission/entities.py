@@ -295,12 +295,7 @@ class EntityReader:
         if not fields.has("generate_rate"):
             return {}
         rate = fields.read("generate_rate", lambda text: codecs.fraction(text, "1/s")) or 0.0
-        slots = (
-            fields.read(
-                "generate_count", lambda text: codecs.integer(text, -self.limits.rows, self.limits.rows)
-            )
-            or 0
-        )
+        slots = fields.read("generate_count", codecs.integer) or 0
         if not (rate > 0.0 and slots > 0):
             text = "<generate_rate> is ignored without a rate > 0 and <generate_count> > 0; all entities exist from the start"
             self.problems.note(fields.place("generate_rate"), text)

@@ -21,7 +21,7 @@ class Limits:
         sequential: The same with update="sequential", where each entity needs its own calls and columns, even after its removal.
         tries: Positions redrawn for the entities of one world that are born at the same time, where interactions reject them.
         substeps: motion_multiplier.
-        steps: Steps until the end.
+        steps: Steps until the end; so many that a game of SCRIMMAGE that ends by itself or by Ctrl-C may name any end.
     """
 
     text: int = 4_000_000
@@ -35,14 +35,14 @@ class Limits:
     sequential: int = 10_000
     tries: int = 50_000
     substeps: int = 10_000
-    steps: int = 1_000_000_000
+    steps: int = 10**15
 
     @classmethod
     def large(cls) -> Limits:
         """Limits for trusted files; still finite, since an error message helps more than running out of memory."""
         return cls(
             text=256_000_000, nodes=10_000_000, files=4096, rows=50_000_000, sequential=50_000_000, tries=10**12,
-            substeps=10_000_000, steps=10**15,
+            substeps=10_000_000,
         )  # fmt: skip
 
     def most_rows(self, update: str) -> int:

@@ -15,7 +15,8 @@ from xml.sax.saxutils import escape, quoteattr
 
 from tussle.errors import MissionError
 from tussle.mission.limits import Limits
-from tussle.mission.problems import Place
+from tussle.mission.mends import mend
+from tussle.mission.problems import Place, Problems
 
 NAMESPACE_END = "}"
 ATTRIBUTE = re.compile(rb"\s+([^\s=<>/]+)\s*=\s*(?:\"[^\"]*\"|'[^']*')")
@@ -181,7 +182,13 @@ class _Builder:
             self.stack[-1][1].append(text)
 
 
-def parse(text: str, file: str, budget: Budget, line_of: Callable[[int], int] = int) -> Node:
+def parse(
+    text: str,
+    file: str,
+    budget: Budget,
+    line_of: Callable[[int], int] = int,
+    problems: Problems | None = None,
+) -> tuple[Node, str]:
     """Parse an XML text to its root tag.
 
     Args:
@@ -189,18 +196,44 @@ def parse(text: str, file: str, budget: Budget, line_of: Callable[[int], int] = 
         file: Its name, for messages.
         budget: Limits that it shares with the mission's other files.
         line_of: Maps a line of `text` to the line of the original file.
+        problems: Receives what was mended in a text that is not well-formed; None to mend nothing.
+
+    Returns:
+        The root tag, and the text, well-formed.
 
     Raises:
         MissionError: It is malformed, has a DOCTYPE, or is too large.
     """
+    try:
+        return _parsed(text, file, budget, line_of), text
+    except _MalformedError as error:
+        first = str(error)
+        mended, changes = mend(text) if problems is not None else (text, [])
+        if problems is None or not changes:
+            raise MissionError(first) from None
+    try:
+        root = _parsed(mended, file, budget, line_of)
+    except _MalformedError as error:  # one of the two is the cause
+        raise MissionError("\n".join(dict.fromkeys((first, str(error))))) from None
+    for line, why, repaired in changes:
+        problems.mended(Place(file, line_of(line)), f"this is not well-formed XML: {why}", repaired)
+    return root, mended
+
+
+class _MalformedError(Exception):
+    """A text is not well-formed XML."""
+
+
+def _parsed(text: str, file: str, budget: Budget, line_of: Callable[[int], int]) -> Node:
     data = text.encode("utf-8", "surrogatepass")
     builder = _Builder(data, file, line_of, budget)
+    n_before = budget.nodes
     try:
         builder.parser.Parse(data, True)
     except expat.ExpatError as error:
-        place = Place(file, line_of(error.lineno))
-        raise MissionError(
-            f"{place}: this is not well-formed XML: {expat.ErrorString(error.code)}{_hint(error)}"
+        budget.nodes = n_before
+        raise _MalformedError(
+            f"{Place(file, line_of(error.lineno))}: this is not well-formed XML: {expat.ErrorString(error.code)}{_hint(error)}"
         ) from None
     assert builder.root is not None
     return builder.root
@@ -210,6 +243,6 @@ def _hint(error: expat.ExpatError) -> str:
     hints = {
         expat.errors.XML_ERROR_TAG_MISMATCH: " (a tag above is not closed, or is closed by another name)",
         expat.errors.XML_ERROR_UNDEFINED_ENTITY: " (only &lt; &gt; &amp; &quot; and &apos; are defined)",
-        expat.errors.XML_ERROR_INVALID_TOKEN: " (in text, & is written &amp; and < is written &lt;)",
+        expat.errors.XML_ERROR_INVALID_TOKEN: " (in text, < is written &lt;)",
     }
     return hints.get(expat.ErrorString(error.code), "")

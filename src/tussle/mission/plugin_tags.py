@@ -6,6 +6,7 @@ import json
 import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 from tussle.api.plugin import Plugin
@@ -43,6 +44,7 @@ class PluginTag:
         attributes: Attributes as written.
         where: Returns the place of an attribute; of the tag for "".
         common: Attributes that it takes from a <param_common>: name -> tag there.
+        node: The tag itself; None for a plugin in a parameter.
     """
 
     tag: str
@@ -50,10 +52,11 @@ class PluginTag:
     attributes: dict[str, str]
     where: Callable[[str], Place]
     common: dict[str, Node] = field(default_factory=dict)
+    node: Node | None = None
 
     @classmethod
     def of(cls, node: Node) -> PluginTag:
-        return cls(node.tag, node.text, dict(node.attributes), node.where)
+        return cls(node.tag, node.text, dict(node.attributes), node.where, node=node)
 
 
 @dataclass
@@ -64,21 +67,25 @@ class PluginReader:
         catalogue: Finds the classes.
         problems: Receives errors and notes.
         budget: Limits that it shares with the mission's files.
+        find: Returns a file of data by its name.
         shared: <param_common> name -> its tags, by name.
         from_geodetic: Converts latitude, longitude [rad], altitude [m], (3,), to a world position [m].
         viewer: Receives attributes for the viewer: "plugin@attribute" -> text.
         unread: Tags of <param_common> that a plugin does not read: place and name -> the arguments of `Problems.unknown`.
         read: Place and name of those that a plugin reads.
+        has_found: Whether attributes were added to tags, since they name files that were found.
     """
 
     catalogue: Catalogue
     problems: Problems
     budget: Budget
+    find: Callable[[str], Path]
     shared: Mapping[str, Mapping[str, Node]] = field(default_factory=dict)
     from_geodetic: Callable[..., Any] | None = None
     viewer: dict[str, str] = field(default_factory=dict)
     unread: dict[tuple[Place, str], tuple[Place, str, str, list[str]]] = field(default_factory=dict)
     read: set[tuple[Place, str]] = field(default_factory=set)
+    has_found: bool = False
 
     def many(self, nodes: Iterable[Node], taken: set[str] | None = None) -> list[Any]:
         """Make the plugins of several tags; tags with errors are left out.
@@ -96,6 +103,7 @@ class PluginReader:
         if cls is None:
             return None
         self._add_shared(written)
+        is_found = self._find_files(written, cls)
         name, rate = self._name(written, taken), self._rate(written)
         values: dict[str, Any] = {}
         known, is_right, rest = cls.historic_attributes, True, dict[str, str]()
@@ -108,7 +116,7 @@ class PluginReader:
                 try:
                     values[parameter] = self._value(cls, parameter, text, written, depth)
                 except TussleError as error:
-                    self._report(written.where(attribute), cls, parameter, error)
+                    self._report(written.where(attribute), cls, parameter, error, text)
                     is_right = False
             elif known.rest and attribute not in known.unread:
                 rest[attribute] = text
@@ -120,7 +128,7 @@ class PluginReader:
         for attribute, text in known.differs.items():
             if attribute not in values:
                 self.problems.note(written.where(""), text)
-        if not is_right:
+        if not (is_right and is_found):
             return None
         try:
             return cls(name=name, rate=rate, states=written.attributes.get("states"), **values)
@@ -171,6 +179,19 @@ class PluginReader:
         self.budget.spend_text(sum(len(node.text) for node in shared.values()), str(place))
         written.common = {key: node for key, node in shared.items() if key not in written.attributes}
         written.attributes |= {key: node.text for key, node in written.common.items()}
+
+    def _find_files(self, written: PluginTag, cls: type[Plugin]) -> bool:
+        """Add the attributes that say where the files are that the tag names. Returns whether all are there."""
+        try:
+            found = cls.with_files(written.attributes, self.find)
+        except TussleError as error:
+            self.problems.error(written.where(""), f"{written.plugin}: {error}")
+            return False
+        written.attributes |= found
+        if found and written.node is not None:
+            written.node.attributes |= found
+            self.has_found = True
+        return True
 
     def report_unread(self) -> None:
         """Report the tags of <param_common> that no plugin reads. A plugin may take some that only others read."""
@@ -232,9 +253,22 @@ class PluginReader:
         tag = next((tag for tag, known in KINDS.items() if known is column.kind), "behaviors")
         made = [
             self.make(PluginTag(tag, name, attributes, lambda _: place), taken, depth + 1)
-            for name, attributes in codecs.inline_plugins(text)
+            for name, attributes in self._inline(text, place)
         ]
         return [plugin for plugin in made if plugin is not None]
+
+    def _inline(self, text: str, place: Place) -> list[codecs.InlinePlugin]:
+        """Parse the plugins in a parameter, also with quotes that do not match."""
+        try:
+            return codecs.inline_plugins(text)
+        except MissionError as error:
+            try:
+                found = codecs.inline_plugins_by_blanks(text)
+                repaired = " ".join(codecs.inline_text(*plugin) for plugin in found)
+            except TussleError:
+                raise error from None
+            self.problems.mended(place, str(error), repaired)
+            return found
 
     def _not_a_parameter(self, written: PluginTag, cls: type[Plugin], attribute: str) -> None:
         viewer, place, known = historic()["viewer"], written.where(attribute), cls.historic_attributes
@@ -253,7 +287,17 @@ class PluginReader:
             else:
                 self.problems.unknown(place, what, attribute, allowed, lists=True)
 
-    def _report(self, place: Place, cls: type[Plugin], parameter: str, error: TussleError) -> None:
+    def _report(
+        self, place: Place, cls: type[Plugin], parameter: str, error: TussleError, written: str
+    ) -> None:
         name = f"{cls.__name__}.{parameter}"
         text = str(error)
+        limit = cls.params().get(parameter)
+        if (
+            limit is not None
+            and limit.ge == 0.0
+            and parameter.endswith("_max")
+            and written.strip().startswith("-")
+        ):
+            text += f'; write {parameter}="{written.strip()[1:]}"'
         self.problems.error(place, text if text.startswith(name) else f"{name}: {text}")

@@ -12,6 +12,8 @@ from tussle.texts import LONGEST_SHOWN, shown
 MOST_LINES = 100
 """Maximum number of errors, and of notes; a file with more is most likely not a mission."""
 
+LONGEST_REPAIRED = 200
+"""Characters of a repaired line in a message."""
 MOST_GUESSED = 1000
 """Maximum number of names that are searched for the nearest one."""
 
@@ -53,6 +55,7 @@ class Problems:
         self._absent: dict[tuple[str, str], str] = {}
         self._unknown: dict[tuple[str, str], tuple[str, str]] = {}
         self._has_unknown = False
+        self._mended: dict[str, tuple[str, list[Place]]] = {}
 
     def error(self, place: Place, text: str) -> None:
         """Add an error: the mission cannot be run.
@@ -100,12 +103,32 @@ class Problems:
             self._has_unknown = True
             self.note(place, f"{text}; it is ignored")
 
+    def mended(self, place: Place, what: str, repaired: str) -> None:
+        """Add what is wrong but has a meaning in SCRIMMAGE: an error, or a note if the reading is lenient and the file has it.
+
+        Args:
+            place: The place.
+            what: What is wrong.
+            repaired: How the same is written right.
+        """
+        if not place.line:
+            self.error(place, what)
+            return
+        self._mended.setdefault(what, (repaired, []))[1].append(place)
+
+    def _mends(self, text: str) -> dict[str, list[Place]]:
+        return {
+            f"{what}; {text} {shown(repaired, LONGEST_REPAIRED)}": places
+            for what, (repaired, places) in islice(self._mended.items(), MOST_LINES)
+        }
+
     @property
     def notes(self) -> tuple[str, ...]:
         """The notes, one line each, in the order of the file."""
+        notes = self._notes if self.strictness.is_strict else self._notes | self._mends("it is read as")
         more = [f"... and {self._n_omitted} more notes"] if self._n_omitted else []
         why = [self.strictness.reason] if self._has_unknown and self.strictness.reason else []
-        return (*_lines(self._notes), *more, *why)
+        return (*_lines(notes), *more, *why)
 
     def at(self, place: Place) -> list[str]:
         """Return the notes about a place."""
@@ -117,10 +140,14 @@ class Problems:
         Raises:
             MissionError: There are errors; the message has one line for each, and one on how unknown names are ignored.
         """
-        if not self._errors:
+        is_strict = self.strictness.is_strict
+        errors = self._errors | self._mends("write") if is_strict else self._errors
+        if not errors:
             return
-        why = [self.strictness.reason] if self._has_unknown and self.strictness.is_strict else []
-        raise MissionError("\n".join([*_lines(self._errors), *filter(None, why)]))
+        why = [self.strictness.reason] if self._has_unknown and is_strict else []
+        if self._mended and is_strict and self.strictness.reason:
+            why.append("--lenient (strict=False) reads what is malformed as SCRIMMAGE does, with a note")
+        raise MissionError("\n".join([*_lines(errors), *filter(None, why)]))
 
 
 def _lines(found: dict[str, list[Place]]) -> list[str]:

@@ -9,6 +9,7 @@ from typing import Any
 
 from tussle.errors import MissionError, TussleError
 from tussle.mission import codecs
+from tussle.mission.data_files import DataFiles
 from tussle.mission.node import Node
 from tussle.mission.problems import Problems
 from tussle.mission.terrain_xml import read_terrain_xml
@@ -36,6 +37,7 @@ class SceneReader:
 
     def __init__(self, root: Node, folders: Sequence[Path], origin: Origin, problems: Problems) -> None:
         self.root, self.folders, self.origin, self.problems = root, list(folders), origin, problems
+        self.data = DataFiles(self.folders[0], self.folders[1:])
         self.files: list[Path] = []
 
     def parts(self) -> dict[str, Any]:
@@ -110,8 +112,8 @@ class SceneReader:
         if path is None:
             self.problems.note(
                 node.place,
-                f"<terrain>: there is no {shown(name)} beside the mission, so the mission has no terrain; it takes a file of "
-                f"{', '.join(SUFFIXES)} or a terrain .xml",
+                f"<terrain>: there is no {shown(name)} beside the mission or in a folder of data (--data-path), so the mission has no "
+                f"terrain; it takes a file of {', '.join(SUFFIXES)} or a terrain .xml",
             )
             return None
         numbers: dict[str, Any] = {
@@ -165,16 +167,13 @@ class SceneReader:
         Raises:
             MissionError: The file lies outside the folders.
         """
-        for folder in self.folders:
-            for candidate in (name, f"{name}.xml"):
-                path = folder / candidate
-                try:
-                    is_file = path.is_file()
-                except (OSError, ValueError):
-                    is_file = False
-                if is_file:
-                    self._inside(path)
-                    return path
+        for candidate in (name, f"{name}.xml"):
+            try:
+                path = self.data.find(candidate)
+            except (OSError, ValueError):  # a MissingFileError, or no name of a file
+                continue
+            self._inside(path)
+            return path
         return None
 
     def _inside(self, path: Path) -> None:

@@ -176,7 +176,7 @@ class SourceReader:
             self.placeholders.setdefault(name, default)
             self.places.setdefault(name, []).extend(replaced.places[name])
         self.files.append(path)
-        return parse(replaced.text, str(path), self.budget, replaced.line_of), replaced.text
+        return parse(replaced.text, str(path), self.budget, replaced.line_of, self.problems)
 
     def _include_all(self, node: Node, inside: list[Path], roots: list[Path]) -> None:
         """Replace each include below a node by the tags that it includes."""
@@ -244,7 +244,7 @@ class SourceReader:
         if found:
             raise MissionError(
                 f"{place}: {shown(base + href)} lies outside the mission's folder and the search paths, so it is not included; "
-                f"add its folder to the search paths"
+                f"--data-path DIR (search=[DIR]) adds a folder to these"
             )
         raise MissionError(f"{place}: there is no file {shown(base + href)} to include")
 

@@ -68,7 +68,7 @@ def read_terrain_xml(
         ParameterError: The surface cannot be read.
     """
     budget = Budget(Limits())
-    root = parse(read_text(path, budget), str(path), budget)
+    root, _ = parse(read_text(path, budget), str(path), budget)
     given = {}
     for node in root.children:
         if node.tag not in TAGS:

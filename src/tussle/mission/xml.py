@@ -13,6 +13,7 @@ from tussle.errors import MissionError, ParameterError, TussleError
 from tussle.geodesy import Origin
 from tussle.mission import codecs
 from tussle.mission.catalogue import KINDS, Catalogue
+from tussle.mission.data_files import DataFiles, data_folders
 from tussle.mission.effects import check_effects
 from tussle.mission.entities import EntityReader, Fields, block_names, expand_entity_common
 from tussle.mission.laws import check_compat
@@ -102,7 +103,8 @@ def read_mission(
         strict: Unknown tags and attributes are errors, else they are ignored with a note; None: they are errors, unless the file has
             marks of a mission of SCRIMMAGE: its style sheet, compat="scrimmage", or tags that only SCRIMMAGE uses, such as <log_dir>.
         plugin_files: Python files with further plugins for the mission.
-        search: Folders that are searched for missions and included files, besides the mission's own.
+        search: Folders that are searched for missions, included files, and files that plugins name (data of SCRIMMAGE), besides the
+            mission's own. Those of the environment variable SCRIMMAGE_DATA_PATH are searched after them.
         allow_large: Raise the limits that keep a hostile file from taking all memory, for reading and for running.
         compat: As for `Mission`; None for the value in the file.
         checks_effects: It is an error if an override has no effect, since its placeholder stands only in what is ignored. For this
@@ -112,6 +114,7 @@ def read_mission(
         MissionError: The mission cannot be read or is invalid. The message has one line for each error, with file and line.
     """
     limits = Limits.large() if allow_large else Limits()
+    search = data_folders(search)
 
     def read(given: Mapping[str, Any]) -> Loaded:
         return _read(source, given, strict, plugin_files, search, limits, compat)
@@ -202,7 +205,10 @@ class _WorldReader:
             problems.error(root.place, "the mission has no <entity>")
         times = self._run()
         origin = self._origin()
-        plugins = PluginReader(self.catalogue, problems, self.budget, self._shared(), origin.from_geodetic)
+        find = DataFiles(self.folders[0], self.folders[1:]).find
+        plugins = PluginReader(
+            self.catalogue, problems, self.budget, find, self._shared(), origin.from_geodetic
+        )
         world = self._world_plugins(plugins)
         scene = SceneReader(root, self.folders, origin, problems)
         entities = EntityReader(plugins, problems, origin, self.limits, times["update"], scene.mesh_lengths)
@@ -210,6 +216,8 @@ class _WorldReader:
         self._count_tags(nodes)
         blocks = [entities.block(node, name) for node, name in zip(nodes, block_names(nodes), strict=True)]
         plugins.report_unread()
+        if plugins.has_found:
+            self.source.text = root.to_text()
         conditions, seed, reseed = self._end_conditions(), self._seed(), self._reseed()
         parts = scene.parts()
         self._settings()
@@ -283,7 +291,7 @@ class _WorldReader:
         # A wrong value has been reported and is replaced by its default.
         dt, start, end = fields.number("dt"), fields.number("start"), fields.number("end")
         most = self.limits.substeps
-        substeps = fields.read("motion_multiplier", lambda text: codecs.integer(text, 1, most))
+        substeps = fields.read("motion_multiplier", lambda text: self._whole(fields, text, most))
         if not abs((end - start) / dt) <= self.limits.steps:
             text = f"there are more than {self.limits.steps:,} steps of {dt:g} s from {start:g} to {end:g} s"
             self.problems.error(fields.place("end"), text)
@@ -295,6 +303,17 @@ class _WorldReader:
             )
         update = fields.read("update", lambda text: MISSION_VALUES["update"].convert(text, "update"))
         return {"dt": dt, "start": start, "end": end, "motion_multiplier": substeps, "update": update}
+
+    def _whole(self, fields: Fields, text: str, most: int) -> int:
+        """Return motion_multiplier, the whole part of a number with a fraction."""
+        value = codecs.number(text)
+        if value < 1.0 or value == int(value):
+            return codecs.integer(text, 1, most)
+        whole = codecs.integer(str(int(value)), 1, most)
+        self.problems.mended(
+            fields.place("motion_multiplier"), f"motion_multiplier: {shown(text)} is not a whole number", f'motion_multiplier="{whole}"'
+        )  # fmt: skip
+        return whole
 
     def _origin(self) -> Origin:
         names = ("latitude_origin", "longitude_origin", "altitude_origin")

@@ -9,8 +9,8 @@ import pytest
 from small_worlds import Drift, Listener, Talker, block, mission
 
 from tussle import Simulation, historic, stock
-from tussle.api import Autonomy, Output, Param, Publish, State, Subscribe
-from tussle.messages import WAYPOINT_MODES, WaypointList, WaypointStatus
+from tussle.api import Autonomy, Output, Param, Publish, Sensor, State, Subscribe
+from tussle.messages import WAYPOINT_MODES, WaypointList, WaypointStatus, WorldPointClicked
 
 
 def moving(name, to=(0, 0, 0), **values):
@@ -340,3 +340,41 @@ def test_a_unicycle_that_should_climb_to_its_prey_dives_and_loops():
     assert roll[""] == pytest.approx(0.0, abs=1e-9)
     assert roll["scrimmage"] == pytest.approx(math.pi, abs=1e-9)
     assert historic.Unicycle().use_pitch is False
+
+
+# -- AvoidWalls, Control3D ------------------------------------------------------------------------------------------------
+
+
+class WallOnTheLeft(Sensor):
+    """A scan of one point."""
+
+    raytrace = Output("raytrace", fields="x y z range in_range", unit="m m m m 1", ragged=True)
+
+    def step(self, g):
+        self.raytrace.set(np.arange(g.n + 1), np.tile([[1.0], [2.0], [0.0], [2.2], [1.0]], g.n))
+
+
+@pytest.mark.parametrize("law", [stock, historic])
+def test_avoid_walls_sees_no_wall(law):
+    car = block(
+        "car", sensor=WallOnTheLeft(), autonomy=law.AvoidWalls(initial_speed=7.0), motion=stock.SimpleCar(),
+        controller=stock.SimpleCarControllerHeading(),
+    )  # fmt: skip
+    sim = Simulation(mission(car), seeds=1)
+    sim.step(3)
+    speed = sim.read("car.AvoidWalls.desired_speed")[0].item()
+    heading = sim.read("car.AvoidWalls.desired_heading")[0].item()
+    assert (speed == 7.0, heading == 0.0) == ((law is historic,) * 2)
+
+
+def test_control_3d_flies_on_until_a_click():
+    drone = block("a", position=(0.0, 0.0, 30.0), heading=math.pi / 2, autonomy=historic.Control3D())
+    sim = Simulation(mission(drone, end=60.0), seeds=1)
+    sim.step(10)
+    names = "desired_speed", "desired_altitude", "desired_heading"
+    read = [sim.read(f"a.Control3D.{name}")[0].item() for name in names]
+    assert read == pytest.approx([21.0, 30.0, math.pi / 2])
+    assert sim.read("a.pos")[0][0, 0] == pytest.approx([0.0, 21.0, 30.0])
+    sim.publish(WorldPointClicked, pos=(0.0, 0.0, 0.0))
+    sim.step(200)
+    assert sim.read("a.pos")[0][0, 0] == pytest.approx([0.0, 0.0, 30.0], abs=1e-4)

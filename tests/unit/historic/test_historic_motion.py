@@ -96,6 +96,22 @@ def test_unicycle_3d_takes_no_command_of_its_acceleration_and_forces_as_velociti
     assert rolled[3:7] == pytest.approx(quat_from_euler(0.0, -0.1, math.pi / 2), abs=1e-7)
 
 
+@pytest.mark.parametrize(
+    ("limits", "command", "rate"),
+    [
+        ({}, 9.0, 1.0),
+        ({"pitch_rate_max": 0.5}, -9.0, -0.5),
+        ({"pitch_rate_max": -0.5, "pitch_rate_min": 0.2}, 9.0, 0.2),
+        ({"pitch_rate_max": -0.5, "pitch_rate_min": 0.2}, -9.0, -0.5),
+        ({"pitch_rate_max": -0.5}, 9.0, 0.5),
+    ],
+)
+def test_unicycle_3d_has_two_limits_and_swaps_them(limits, command, rate):
+    x0 = [0, 0, 0, *LEVEL, 0, 0, 0, *LEVEL]
+    end = after(historic.Unicycle3D(**limits), x0, 0.0, 0.0, command, 0.0, *[0.0] * 6)
+    assert end[3:7] == pytest.approx(quat_from_euler(0.0, -rate * H, 0.0), abs=1e-7)
+
+
 def test_rigid_body_hardly_turns():
     end = after(historic.RigidBody6DOF(), [0, 0, 0, 10, 0, 0, *LEVEL, *LEVEL], 3.0, 0.0, 0.0, 0.0, steps=10)
     assert end[3] == pytest.approx(13.0)

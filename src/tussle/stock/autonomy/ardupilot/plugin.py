@@ -39,6 +39,8 @@ class ArduPilot(Autopilot):
         PluginError: ArduPilot does not answer, starts anew, sends too much, or a second one sends to its port.
     """
 
+    awaits = "ArduPilot, such as its SITL"
+
     historic_attributes = HistoricAttributes(unread=("asynchronous_mode",))
 
     protocol = Param(

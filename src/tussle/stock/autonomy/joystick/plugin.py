@@ -39,6 +39,7 @@ class Joystick:
     """Columns and methods of both plugins; abstract."""
 
     grade = "external"
+    awaits = "a joystick at {device}"
     historic_attributes = HistoricAttributes(unread=("print_raw_joystick_values",))
 
     device = Param("/dev/input/js0", doc="Joystick device of the kernel.")

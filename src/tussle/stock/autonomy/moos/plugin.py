@@ -4,19 +4,24 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from tussle.api import Autonomy, GroupView, Handle, HistoricAttributes, Output, Param
-from tussle.errors import ParameterError
+from tussle.errors import MissingFileError, ParameterError
 from tussle.stock.autonomy.moos import wire
 from tussle.stock.autonomy.moos.mission_file import community_of
 from tussle.stock.autonomy.moos.vessel import Vessel
 
 NAVIGATION = ("NAV_X", "NAV_Y", "NAV_HEADING", "NAV_SPEED", "NAV_DEPTH")
 MOST_PORT = 65535
+LAUNCH = "launch.sh"
+"""Script beside the missions of MOOS that writes them from templates and starts the communities."""
 
 
 class Communities(dict[tuple[str, int], str]):
@@ -45,6 +50,7 @@ class MOOSAutonomy(Autonomy):
     """
 
     grade = "external"
+    awaits = "a community of MOOS-IvP with MOOSDB and helm"
     historic_attributes = HistoricAttributes(unread=("moos_script", "enable_actuator_control"))
 
     moos_mission_file = Param(
@@ -74,6 +80,31 @@ class MOOSAutonomy(Autonomy):
     desired_heading = Output(unit="rad", doc="From DESIRED_HEADING, counter-clockwise from East.")
     desired_speed = Output(unit="m/s", doc="DESIRED_SPEED.")
     desired_altitude = Output(unit="m", doc="From DESIRED_DEPTH.")
+
+    @classmethod
+    def with_files(cls, given: Mapping[str, str], find: Callable[[str], Path]) -> dict[str, str]:
+        """Return the path of the mission file of MOOS; none if it is not there, since MOOS's launch scripts write theirs."""
+        name = given.get("moos_mission_file", "")
+        if not name or Path(name).is_file():
+            return {}
+        with suppress(MissingFileError):
+            return {"moos_mission_file": str(find(name))}
+        with suppress(MissingFileError):  # where its script will write it
+            folder = find(f"{Path(name).parent.name}/{LAUNCH}").parent
+            return {"moos_mission_file": str(folder / Path(name).name)}
+        find(name)
+        return {}
+
+    @property
+    def awaited(self) -> str:
+        """The community, and its mission file if it is not there."""
+        path = Path(self.values["moos_mission_file"])
+        has_file = not path.name or path.is_file()
+        return (
+            self.awaits
+            if has_file
+            else f"{path.name}, which {LAUNCH} in {path.parent} writes, and {self.awaits}"
+        )
 
     def open_one(self, row: Any) -> Vessel:
         """Connect to the community of an entity, without waiting.

@@ -35,6 +35,8 @@ class PX4(Autopilot):
         PluginError: PX4 does not connect or answer, ends, or sends something other than MAVLink or too much.
     """
 
+    awaits = "PX4, such as its SITL"
+
     control_map = ChannelMapParam(
         CONTROL_MAP,
         n_inputs=N_CONTROLS,

@@ -18,6 +18,7 @@ class CommandedByROS(Autonomy):
     """Columns and methods of robots that follow cmd_vel; abstract."""
 
     grade = "external"
+    awaits = "ROS"
     link_type: ClassVar[type[NodeLink]] = RosLink
     """What connects it to ROS."""
     publishes: ClassVar[bool] = False

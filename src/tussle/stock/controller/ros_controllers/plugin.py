@@ -14,6 +14,7 @@ class SurfacesByROS(Controller):
     """Columns and methods of both plugins; abstract."""
 
     grade = "external"
+    awaits = "ROS"
 
     namespace_prefix = Param(
         "",

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
 import numpy as np
 
 from tussle.api import Interaction, Param
 from tussle.errors import ParameterError
 from tussle.scene import Cuboid, Volume
+from tussle.stock.interaction.map_gen_2d.map_file import read_map_file
 
 MOST_WALLS = 20_000
 
@@ -14,7 +18,9 @@ MOST_WALLS = 20_000
 class MapGen2D(Interaction):
     """Walls where the image of a map is dark: boxes on which rays of the scene end. The upper edge of the image is north.
 
-    It needs Pillow, which `pip install 'tussle[maps]'` installs. SCRIMMAGE looked the map up in its own folders.
+    It needs Pillow, which `pip install 'tussle[maps]'` installs. A mission may name a map file of SCRIMMAGE instead of the image: an .xml
+    beside the mission or in a folder of data, which has the image and the values of the other parameters. Its `occupied_thresh` is
+    truncated there: below 1, only black pixels are walls.
     Entities collide with the walls where the mission has `BulletCollision` or `SceneCollision`.
 
     Raises:
@@ -23,7 +29,7 @@ class MapGen2D(Interaction):
 
     grade = "portable"
 
-    map = Param("maze_2d_1", doc="Path of the image.")
+    map = Param("maze_2d_1", doc="Path of the image; in a mission also of a map file, or its name.")
     resolution = Param(1.0, unit="m", gt=0.0, structural=True, doc="Width of a pixel.")
     corner = Param(
         (0.0, 0.0, 0.0), fields="x y z", unit="m", structural=True, doc="South-western corner of the map, on the ground."
@@ -33,11 +39,37 @@ class MapGen2D(Interaction):
         128, ge=0, le=256, structural=True, doc="Brightness, 0 to 255, below which a pixel is a wall."
     )
 
+    boundary = Param(False, structural=True, doc="Walls, a pixel thick, along the four edges of the map.")
+
+    @classmethod
+    def with_files(cls, given: Mapping[str, str], find: Callable[[str], Path]) -> dict[str, str]:
+        """Return the path of the image, and the values of the map file that the tag does not have.
+
+        Raises:
+            MissingFileError: There is no such map, or not its image.
+            TussleError: The map file is damaged, or a value of it is wrong.
+        """
+        name = given.get("map", cls.params()["map"].default)
+        path = Path(name)
+        if not path.suffix:
+            path = find(f"{name}.xml")
+        elif not path.is_file():
+            path = find(name)
+        if path.suffix != ".xml":
+            return {} if str(path) == name else {"map": str(path)}
+        found = read_map_file(path)
+        return {key: text for key, text in found.items() if key == "map" or key not in given}
+
     def walls(self) -> tuple[Volume, ...]:
         """Return the walls: dark pixels as few boxes along the axes."""
         is_wall = self._brightness() < self.threshold
         size, (x, y, z) = self.resolution, self.corner
         found = _boxes(is_wall)
+        if self.boundary:
+            rows, columns = is_wall.shape
+            found += [
+                (0, 1, 0, columns), (0, rows, 0, 1), (0, rows, columns, columns + 1), (rows, rows + 1, 0, columns),
+            ]  # fmt: skip
         if len(found) > MOST_WALLS:
             raise ParameterError(
                 f"MapGen2D.map = {self.map!r} has {len(found):,} walls; it may have {MOST_WALLS:,}"

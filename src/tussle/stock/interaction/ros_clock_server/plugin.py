@@ -13,6 +13,7 @@ class ClockOfROS(Interaction):
     """Columns and methods of clocks; abstract."""
 
     grade = "external"
+    awaits = "ROS"
     clock_type: ClassVar[type[ClockTopic]]
     """Its part outside the simulation."""
 

@@ -30,6 +30,7 @@ class ROSShapeViz(Interaction):
     """
 
     grade = "external"
+    awaits = "ROS"
 
     frame = Param("map", doc="Frame of the published markers: the world frame.")
 

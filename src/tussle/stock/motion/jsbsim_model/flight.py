@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import tempfile
 from array import array
 from collections import deque
@@ -12,7 +13,7 @@ from pathlib import Path
 from typing import Any, NamedTuple, Self
 
 from tussle import units
-from tussle.errors import ParameterError, nearest_name
+from tussle.errors import MissingFileError, ParameterError, nearest_name
 from tussle.geodesy import Origin
 
 FOOT = float(units.FOOT)  # [m]
@@ -29,6 +30,8 @@ MOTION = "ic/vn-fps", "ic/ve-fps", "ic/vd-fps", "ic/p-rad_sec", "ic/q-rad_sec", 
 THROTTLES = "fcs/throttle-cmd-norm"
 """Stands for the throttles of all engines."""
 WIND = "atmosphere/wind-north-fps", "atmosphere/wind-east-fps", "atmosphere/wind-down-fps"
+USE = re.compile(r"""<use\s[^>]{0,500}?\baircraft\s*=\s*["']([^"'<>]{1,200})["']""")
+"""The tag of a script that names its aircraft."""
 TRIMS = {"none": -1, "longitudinal": 0, "full": 1, "ground": 2}
 Placing = tuple[Sequence[float], Origin]
 """Arguments of `JSBSimFlight.place`."""
@@ -156,6 +159,31 @@ class JSBSimFlight:
                 *values, n_steps = flown[k : k + width]
                 flight.fly(values, int(n_steps))
         return flight
+
+
+def is_packaged(name: str) -> bool:
+    """Return whether JSBSim's package has a file; True without the package, since nothing is known of it."""
+    try:
+        import jsbsim
+    except ImportError:
+        return True
+    return Path(jsbsim.get_default_root_dir(), name).is_file()
+
+
+def root_of(file: Path, name: str) -> Path:
+    """Return the folder below which JSBSim reads a script or an aircraft of this name.
+
+    Raises:
+        MissingFileError: The file is in another folder, or a script uses an aircraft that is not there.
+    """
+    parts = Path(name).parts
+    root = file.parents[len(parts) - 1]
+    if file.parts[-len(parts) :] != parts:
+        raise MissingFileError(f"{file} is not in a folder {Path(*parts[:-1])}, where JSBSim reads it")
+    used = USE.search(file.read_text(encoding="utf-8", errors="replace"))
+    if used is not None and not (root / "aircraft" / used[1] / f"{used[1]}.xml").is_file():
+        raise MissingFileError(f"{file} uses the aircraft {used[1]!r}, which is not in {root / 'aircraft'}")
+    return root
 
 
 def load(aircraft: Aircraft, dt: float) -> Any:

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
 
 from tussle import units
 from tussle.api import Handle, HistoricAttributes, Input, MotionBody, Param, RigidBodyModel
-from tussle.errors import ParameterError, SnapshotError, listed, nearest_name
+from tussle.errors import MissingFileError, ParameterError, SnapshotError, listed, nearest_name
 from tussle.geodesy import ECCENTRICITY_SQUARED, SEMI_MAJOR, SEMI_MINOR, Origin
 from tussle.numeric.quaternion import (
     quat_conjugate,
@@ -21,7 +22,15 @@ from tussle.numeric.quaternion import (
 )
 from tussle.stock.motion.jsbsim_model import kernels
 from tussle.stock.motion.jsbsim_model.fleet import Fleet, Flown
-from tussle.stock.motion.jsbsim_model.flight import FOOT, THROTTLES, TRIMS, Aircraft, SavedFlight
+from tussle.stock.motion.jsbsim_model.flight import (
+    FOOT,
+    THROTTLES,
+    TRIMS,
+    Aircraft,
+    SavedFlight,
+    is_packaged,
+    root_of,
+)
 from tussle.stock.motion.jsbsim_model.processes import LOST, FleetProcesses, n_cores
 
 KNOT = float(units.NAUTICAL_MILE / 3600)  # [m/s]
@@ -97,6 +106,25 @@ class JSBSimAircraft(RigidBodyModel):
         doc="Processes that fly the aircraft; 1 is that of the simulation, 0 is one for each core. Results do not depend on it.",
     )
     flight = Handle(doc="The aircraft in JSBSim.")
+
+    @classmethod
+    def with_files(cls, given: Mapping[str, str], find: Callable[[str], Path]) -> dict[str, str]:
+        """Return the folder that has the script in `scripts`, or the aircraft in `aircraft`; none if the package has it.
+
+        Raises:
+            MissingFileError: The script, the aircraft, or the aircraft of the script is missing.
+        """
+        script, aircraft = given.get("script_name", ""), given.get("aircraft", "")
+        if given.get("jsbsim_root") or not (script or aircraft):
+            return {}
+        name = f"scripts/{script}" if script else f"aircraft/{aircraft}/{aircraft}.xml"
+        try:
+            root = root_of(find(name), name)
+        except MissingFileError:
+            if is_packaged(name):
+                return {}
+            raise
+        return {"jsbsim_root": str(root)}
 
     def open_one(self, row: Any) -> FlightHandle:
         """Load the aircraft; `spawn` reports its errors.

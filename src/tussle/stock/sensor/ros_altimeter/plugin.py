@@ -34,6 +34,7 @@ class ROSAltimeter(Sensor):
     """
 
     grade = "external"
+    awaits = "ROS"
     historic_attributes = HistoricAttributes()
 
     vehicle_name = Param("none", doc="Namespace; none for prefix and id.")

@@ -25,6 +25,7 @@ class CompassByROS(Sensor):
     """Columns and methods of compasses; abstract."""
 
     grade = "external"
+    awaits = "ROS"
     link_type: ClassVar[type[NodeLink]] = RosLink
     """What connects it to ROS."""
 

@@ -27,6 +27,7 @@ class ImuByROS(Sensor):
     """Columns and methods of inertial sensors; abstract."""
 
     grade = "external"
+    awaits = "ROS"
     link_type: ClassVar[type[NodeLink]] = RosLink
     """What connects it to ROS."""
 
