@@ -10,11 +10,15 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import Any
 
+from tussle.checksums import BLANK, MARK, is_intact, sealed
 from tussle.errors import ParameterError, TussleError, listed, nearest_name
 
 MOST_BYTES = 1 << 25
 """Maximum size of a document. Parsed JSON takes up to about twenty times as much memory."""
 LONGEST_SHOWN = 80
+CHECKSUM = "checksum"
+"""Field of a document that holds its checksum."""
+DAMAGED = f"is damaged: its checksum does not match its content; if it was edited, remove the line {CHECKSUM!r} to read it as it is"
 
 
 def size_of(path: Path, most: int | None = None) -> int:
@@ -243,7 +247,24 @@ class Document:
             )
         if violation := problem(found, self.rule):
             raise self.error(f"{path}: {violation}")
+        if found.pop(CHECKSUM, None) is not None and not is_intact(text.encode()):
+            raise self.error(f"{path}: {DAMAGED}")
         return dict(found)
+
+    def is_damaged(self, path: Path) -> bool:
+        """Return True if a file has a checksum that does not match its content."""
+        try:
+            data = read_text(path, self.error).encode()
+        except TussleError:
+            return False
+        return MARK in data and not is_intact(data)
+
+
+def json_text(values: Mapping[str, Any]) -> str:
+    """A document with its checksum. The values are those of JSON."""
+    return sealed(
+        (json.dumps({CHECKSUM: BLANK, **values}, indent=1, allow_nan=False) + "\n").encode()
+    ).decode()
 
 
 def _no_number(name: str) -> None:

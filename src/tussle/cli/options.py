@@ -158,7 +158,7 @@ class PluginOptions:
 
 @dataclass(frozen=True, kw_only=True)
 class MissionOptions(PluginOptions):
-    """Check a mission: read it, build its game, and report all errors."""
+    """Check a mission: read it, build its game, and report all errors. Check a run or batch directory: report all damage."""
 
     mission: Annotated[
         str,

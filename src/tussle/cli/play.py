@@ -22,11 +22,12 @@ from tussle.cli.options import MissionOptions
 from tussle.cli.play_options import ConvertOptions, RunOptions
 from tussle.cli.progress import ProgressMeter, compiling
 from tussle.cli.summary import Speed, show_summary
-from tussle.cli.terminal import out, say, say_note
+from tussle.cli.terminal import OK, WRONG_INPUT, out, say, say_error, say_note
 from tussle.displays import counted
 from tussle.engine.simulation import Simulation
 from tussle.errors import BatchError, MissionError, ParameterError, RecordError, WiringError
 from tussle.mission import Loaded, Mission, to_python, to_xml
+from tussle.record.schema import RUN_FILE, TRAJECTORY_FILE
 
 if TYPE_CHECKING:
     from tussle.batch.reload import PlannedRun
@@ -70,13 +71,36 @@ def record(
     )  # fmt: skip
 
 
-def check(options: MissionOptions) -> None:
-    """Build the game of a mission and show its size."""
+def check(options: MissionOptions) -> int:
+    """Build the game of a mission and show its size; or compare the files of a run or batch directory with their checksums.
+
+    Returns:
+        The exit code.
+    """
+    path = Path(options.mission)
+    if any((path / name).exists() for name in ("batch.json", RUN_FILE, TRAJECTORY_FILE)):
+        return _check_directory(path)
     loaded, mission, seed = options.read(shows_viewer_notes=True)
     with compiling(), simulate(loaded, mission, seed) as simulation:
         n = counted(sum(block.count for block in mission.blocks), "entity", "entities")
         notes = f", {counted(len(loaded.notes), 'note')}" if loaded.notes else ""
         out().print(f"{options.mission} can be played: {n}, grade {simulation.grade}{notes}", soft_wrap=True)
+    return OK
+
+
+def _check_directory(path: Path) -> int:
+    from tussle.batch.damage import damage_in_batch
+    from tussle.record.damage import damage_in_run
+
+    damage, unchecked = (damage_in_batch if (path / "batch.json").exists() else damage_in_run)(path)
+    for line in unchecked:
+        say_note(f"{line}; an older version wrote it")
+    for line in damage:
+        say_error(f"{path}: {line}")
+    if damage:
+        return WRONG_INPUT
+    out().print(f"{path} is intact", soft_wrap=True)
+    return OK
 
 
 def convert(options: ConvertOptions) -> None:
