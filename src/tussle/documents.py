@@ -35,6 +35,20 @@ def size_of(path: Path, most: int | None = None) -> int:
     return about.st_size
 
 
+def read_bytes(path: Path, error: type[TussleError], most: int = MOST_BYTES) -> bytes:
+    """Read a file. All files that a mission names are read by this function, or by `read_text`.
+
+    Raises:
+        TussleError: As `error`: the file is not a regular file, or is larger than `most` bytes.
+    """
+    try:
+        size_of(path, most)
+        with path.open("rb") as file:
+            return file.read(most)
+    except (OSError, ValueError) as reason:
+        raise error(f"{path}: cannot be read: {getattr(reason, 'strerror', None) or reason}") from None
+
+
 def read_text(path: Path, error: type[TussleError], most: int = MOST_BYTES) -> str:
     """Read a UTF-8 text file.
 
@@ -42,11 +56,9 @@ def read_text(path: Path, error: type[TussleError], most: int = MOST_BYTES) -> s
         TussleError: As `error`: the file is not a regular file, is larger than `most` bytes, or is not UTF-8 text.
     """
     try:
-        size_of(path, most)
-        with path.open("rb") as file:
-            return file.read(most).decode("utf-8")
-    except (OSError, ValueError) as reason:
-        raise error(f"{path}: cannot be read: {getattr(reason, 'strerror', None) or reason}") from None
+        return read_bytes(path, error, most).decode("utf-8")
+    except ValueError as reason:
+        raise error(f"{path}: cannot be read: {reason}") from None
 
 
 # -- schemas ------------------------------------------------------------------------------------------------------------------

@@ -49,7 +49,7 @@ class _NoMessageError(InvalidStreamError):
     """No message begins here."""
 
 
-class Block(NamedTuple):
+class StreamBlock(NamedTuple):
     """A block of a stream.
 
     Attributes:
@@ -66,7 +66,7 @@ class Block(NamedTuple):
 
 
 @dataclass
-class Blocks:
+class StreamBlocks:
     """The blocks of a file.
 
     Attributes:
@@ -76,7 +76,7 @@ class Blocks:
         is_sealed: Its blocks have checksums.
     """
 
-    intact: list[Block] = field(default_factory=list)
+    intact: list[StreamBlock] = field(default_factory=list)
     lost: list[tuple[int, int]] = field(default_factory=list)
     is_truncated: bool = False
     is_sealed: bool = False
@@ -106,7 +106,7 @@ def sealed_blocks(batch: pa.RecordBatch) -> tuple[memoryview, memoryview]:
     return data[: first.end], data[first.end : second.end]
 
 
-def find_blocks(path: Path, *, is_checked: bool = True) -> Blocks:
+def find_blocks(path: Path, *, is_checked: bool = True) -> StreamBlocks:
     """Find the blocks of a file. Behind a damaged block, the next intact one is searched.
 
     Args:
@@ -117,7 +117,7 @@ def find_blocks(path: Path, *, is_checked: bool = True) -> Blocks:
         OSError: It is not a regular file.
         InvalidStreamError: It is not an Arrow stream, or a message of a stream without checksums is invalid.
     """
-    size, found = size_of(path), Blocks()
+    size, found = size_of(path), StreamBlocks()
     search = _Search(MAX_SEARCH * size)
     with path.open("rb") as file:
         at = 0
@@ -179,7 +179,7 @@ class _Search:
         return None
 
 
-def _is_intact(file: BinaryIO, block: Block) -> bool:
+def _is_intact(file: BinaryIO, block: StreamBlock) -> bool:
     assert block.digits is not None
     crc = crc_of_part(file, 0, block.start, block.digits)
     digits = file.read(N_DIGITS)
@@ -194,7 +194,7 @@ def _is_end(file: BinaryIO, at: int) -> bool:
     return file.read(8) == END_MARK
 
 
-def _block(file: BinaryIO, start: int, size: int) -> Block | None:
+def _block(file: BinaryIO, start: int, size: int) -> StreamBlock | None:
     """The block that begins at a position: dictionaries and the message behind them. None if the file ends within it.
 
     Raises:
@@ -208,7 +208,7 @@ def _block(file: BinaryIO, start: int, size: int) -> Block | None:
             return None
         mark, length = struct.unpack("<Ii", head)
         if at > start and head == END_MARK:
-            return Block(start, at, DICTIONARY, None)
+            return StreamBlock(start, at, DICTIONARY, None)
         if mark != 0xFFFFFFFF:
             raise _NoMessageError("it is not an Arrow stream")
         if _is_within(length, MOST_HEAD, size - at - 8):
@@ -216,7 +216,7 @@ def _block(file: BinaryIO, start: int, size: int) -> Block | None:
             if _is_within(body, MOST_BODY, size - at - 8 - length):
                 at += 8 + length + body
                 if kind != DICTIONARY:
-                    return Block(start, at, kind, digits)
+                    return StreamBlock(start, at, kind, digits)
                 continue
         return None
 

@@ -10,7 +10,7 @@ import pyarrow.compute as pc
 
 from tussle.displays import counted
 from tussle.errors import TussleError
-from tussle.record.arrow_blocks import SCHEMA, Blocks, InvalidStreamError, find_blocks
+from tussle.record.arrow_blocks import SCHEMA, InvalidStreamError, StreamBlocks, find_blocks
 from tussle.record.table_values import Rules, check_values
 
 MAX_CHECKED_MAPPED = 1 << 28
@@ -71,7 +71,7 @@ def read_batches(
         notes.append(f"{path.name} is truncated after {n} complete batches")
 
 
-def damage_of(path: Path, blocks: Blocks) -> str:
+def damage_of(path: Path, blocks: StreamBlocks) -> str:
     """Describe the damaged parts of a file; "" if there are none."""
     if not blocks.lost:
         return ""
@@ -81,7 +81,7 @@ def damage_of(path: Path, blocks: Blocks) -> str:
 
 
 def _batches(
-    path: Path, blocks: Blocks, schema: pa.Schema | None, is_mapped: bool
+    path: Path, blocks: StreamBlocks, schema: pa.Schema | None, is_mapped: bool
 ) -> Iterator[pa.RecordBatch]:
     """The batches of the intact blocks.
 
@@ -101,7 +101,9 @@ def _batches(
             yield batch
 
 
-def _batches_of_damaged(path: Path, blocks: Blocks, schema: pa.Schema | None) -> Iterator[pa.RecordBatch]:
+def _batches_of_damaged(
+    path: Path, blocks: StreamBlocks, schema: pa.Schema | None
+) -> Iterator[pa.RecordBatch]:
     """The batches of the intact blocks, each with its dictionaries. If the schema in the file is damaged, the required one is used."""
     head = None if schema is None else schema.serialize().to_pybytes()
     with path.open("rb") as file:
