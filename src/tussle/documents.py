@@ -10,11 +10,15 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import Any
 
+from tussle.checksums import BLANK, MARK, is_intact, sealed
 from tussle.errors import ParameterError, TussleError, listed, nearest_name
 
 MOST_BYTES = 1 << 25
 """Maximum size of a document. Parsed JSON takes up to about twenty times as much memory."""
 LONGEST_SHOWN = 80
+CHECKSUM = "checksum"
+"""Field of a document that holds its checksum."""
+DAMAGED = f"is damaged: its checksum does not match its content; if it was edited, remove the line {CHECKSUM!r} to read it as it is"
 
 
 def size_of(path: Path, most: int | None = None) -> int:
@@ -31,6 +35,20 @@ def size_of(path: Path, most: int | None = None) -> int:
     return about.st_size
 
 
+def read_bytes(path: Path, error: type[TussleError], most: int = MOST_BYTES) -> bytes:
+    """Read a file. All files that a mission names are read by this function, or by `read_text`.
+
+    Raises:
+        TussleError: As `error`: the file is not a regular file, or is larger than `most` bytes.
+    """
+    try:
+        size_of(path, most)
+        with path.open("rb") as file:
+            return file.read(most)
+    except (OSError, ValueError) as reason:
+        raise error(f"{path}: cannot be read: {getattr(reason, 'strerror', None) or reason}") from None
+
+
 def read_text(path: Path, error: type[TussleError], most: int = MOST_BYTES) -> str:
     """Read a UTF-8 text file.
 
@@ -38,11 +56,9 @@ def read_text(path: Path, error: type[TussleError], most: int = MOST_BYTES) -> s
         TussleError: As `error`: the file is not a regular file, is larger than `most` bytes, or is not UTF-8 text.
     """
     try:
-        size_of(path, most)
-        with path.open("rb") as file:
-            return file.read(most).decode("utf-8")
-    except (OSError, ValueError) as reason:
-        raise error(f"{path}: cannot be read: {getattr(reason, 'strerror', None) or reason}") from None
+        return read_bytes(path, error, most).decode("utf-8")
+    except ValueError as reason:
+        raise error(f"{path}: cannot be read: {reason}") from None
 
 
 # -- schemas ------------------------------------------------------------------------------------------------------------------
@@ -243,7 +259,24 @@ class Document:
             )
         if violation := problem(found, self.rule):
             raise self.error(f"{path}: {violation}")
+        if found.pop(CHECKSUM, None) is not None and not is_intact(text.encode()):
+            raise self.error(f"{path}: {DAMAGED}")
         return dict(found)
+
+    def is_damaged(self, path: Path) -> bool:
+        """Return True if a file has a checksum that does not match its content."""
+        try:
+            data = read_text(path, self.error).encode()
+        except TussleError:
+            return False
+        return MARK in data and not is_intact(data)
+
+
+def json_text(values: Mapping[str, Any]) -> str:
+    """A document with its checksum. The values are those of JSON."""
+    return sealed(
+        (json.dumps({CHECKSUM: BLANK, **values}, indent=1, allow_nan=False) + "\n").encode()
+    ).decode()
 
 
 def _no_number(name: str) -> None:

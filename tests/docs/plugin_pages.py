@@ -86,6 +86,7 @@ def plugin_page(name: str, cls: Any) -> str:
     methods = {re.match(r"- `(\w+)", line)[1]: line[2:] for line in members(cls)}  # type: ignore[index]
     lines += part("Services", (methods.pop(key) for key in cls.services))
     methods.pop("named_regions", None)
+    methods.pop("named_blocks", None)
     lines += part("Methods", iter(methods.values()))
     example = stock.examples()[name]
     text = example.read_text(encoding="utf-8")
@@ -118,6 +119,8 @@ def needs(cls: Any) -> Iterator[str]:
     """What a mission must have besides the plugin."""
     if cls.named_regions is not Plugin.named_regions:
         yield (inspect.getdoc(cls.named_regions) or "").removeprefix("Return ").capitalize()
+    if cls.named_blocks is not Plugin.named_blocks:
+        yield (inspect.getdoc(cls.named_blocks) or "").removeprefix("Return ").capitalize()
     yield from (
         f"A plugin of the same entity that offers the service `{name}`" for name in cls.needed_services
     )

@@ -9,7 +9,7 @@ from pathlib import Path
 from xml.parsers import expat
 
 from tussle.aircraft.units import factor
-from tussle.documents import size_of
+from tussle.documents import read_bytes
 from tussle.errors import ParameterError
 
 MOST_BYTES = 8 << 20
@@ -132,12 +132,7 @@ def read_file(path: Path) -> Element:
     Raises:
         AircraftError: It cannot be read, is no XML, or exceeds a limit.
     """
-    try:
-        size_of(path, MOST_BYTES)
-        data = path.read_bytes()
-    except OSError as reason:
-        raise AircraftError(f"{path}: cannot be read: {reason.strerror or reason}") from None
-    return read_text(data, path.name)
+    return read_text(read_bytes(path, AircraftError, MOST_BYTES), path.name)
 
 
 def read_text(data: bytes, name: str) -> Element:

@@ -190,6 +190,18 @@ class Plugin:
     def check_values(self) -> None:
         """Check parameters that must fit together, as data; a hook that raises `ParameterError` if they do not."""
 
+    def check_range(self, low: str, high: str) -> None:
+        """Check that a parameter is smaller than another one; to be called by `check_values` of plugins that divide by the difference.
+
+        Raises:
+            ParameterError: It is not.
+        """
+        least, most = self.values[low], self.values[high]
+        if not least < most:
+            raise ParameterError(
+                f"{type(self).__name__}.{low} = {least!r} with {high} = {most!r} is not allowed; {low} must be smaller than {high}"
+            )
+
     # -- declarations ---------------------------------------------------------------------------------------------------
 
     @classmethod
@@ -252,6 +264,10 @@ class Plugin:
 
     def named_regions(self) -> Iterable[float]:
         """Ids of the regions that the plugin asks for with `g.region` or `w.region`; a mission without them is refused."""
+        return ()
+
+    def named_blocks(self) -> Iterable[str]:
+        """Names of the entity blocks that the plugin refers to; a mission without them is refused."""
         return ()
 
     def structure(self) -> tuple[Any, ...]:

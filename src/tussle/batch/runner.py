@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass
@@ -197,7 +198,7 @@ def play_in_directory(
             if on_progress is not None:
                 on_progress(Progress(before["n_runs"], before["n_runs"], before["n_runs"]))
             return Results(files.load(path))
-        played = store.played()
+        played, notes = files.read_played(path)
         n_kept = 0 if before is None else _seeds_to_keep(path, played, before, until)
         plan = dataclasses.replace(batch.plan, n_seeds=max(batch.plan.n_seeds, n_kept))
         stop = None if until is None else Stop(until, plan, n_kept)
@@ -211,7 +212,11 @@ def play_in_directory(
         store.write_info(_info(runner, plan, command) | started)
         store.write_folder(files.MISSION, batch.mission_files())
         store.write_table(files.DESIGN_FILE, plan.table())
-        known, _ = files.merged(path, played, plan.table())
+        known, _ = files.merged(path, played, plan.table(), notes)
+        for note in notes:
+            warnings.warn(
+                f"{path}: {note}; the runs that it lacks are played again", RuntimeWarning, stacklevel=2
+            )
         try:
             runner.play(files.finished_in(known), executor)
         finally:
@@ -221,7 +226,7 @@ def play_in_directory(
 
 
 def is_played(batch: Playable, path: Path, until: Until | None) -> bool:
-    """All of a batch is in a directory already.
+    """All of a batch is in a directory already, undamaged.
 
     Raises:
         BatchError: The directory holds another batch, or one that cannot be read.
@@ -230,7 +235,7 @@ def is_played(batch: Playable, path: Path, until: Until | None) -> bool:
         return False
     info = files.read_info(path)
     _check_same(batch, path, info)
-    return _has_all(info, batch.plan, until)
+    return _has_all(info, batch.plan, until) and not files.damage(path)
 
 
 def _check_same(batch: Playable, path: Path, before: dict[str, Any]) -> None:
@@ -281,7 +286,7 @@ def _seeds_to_keep(path: Path, played: pa.Table, before: dict[str, Any], until: 
     kept = int(before.get("n_seeds_kept", 0))
     if until is not None and before.get("until") == str(until):
         return kept
-    old = files.read_table(path, files.RESULTS_FILE, files.RESULTS)
+    old = files.read_table(path, files.RESULTS_FILE, files.RESULTS, [])
     last = [pc.max(table["run"]).as_py() for table in (played, old) if table is not None and table.num_rows]
     return max(kept, *(run // int(before["n_points"]) + 1 for run in last)) if last else kept
 
@@ -292,7 +297,7 @@ def _write_tables(
     """Write the tables, and last the `batch.json` that says that they are there."""
     plan = runner.final_plan
     design = plan.table()
-    results, alive = files.merged(store.path, store.played(), design)
+    results, alive = files.merged(store.path, files.read_played(store.path)[0], design, [])
     if plan != runner.plan:
         results, alive = (t.filter(pc.less(t["run"], plan.n_runs)) for t in (results, alive))
     store.write_table(files.ALIVE_FILE, alive)

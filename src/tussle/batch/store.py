@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import json
 import math
 import os
 import shutil
@@ -16,14 +15,15 @@ from typing import IO, Any
 import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
-import pyarrow.parquet as pq
 
 from tussle.batch.consistency import check_design, check_metrics, check_results
 from tussle.batch.schemas import BATCH, RULES
 from tussle.batch.tasks import Finished
+from tussle.documents import json_text
 from tussle.errors import BatchError, RecordError
 from tussle.folders import lock, open_safely
 from tussle.record.arrow_file import read_batches
+from tussle.record.parquet_blocks import write_parquet
 from tussle.record.parquet_file import read_parquet
 from tussle.record.run_file import plain, put_whole
 from tussle.record.stream import Stream
@@ -206,7 +206,7 @@ class Store:
     def write_info(self, info: Mapping[str, Any]) -> None:
         """Write `batch.json`, as a whole."""
         with reported(self.path):
-            put_whole(self.path / BATCH_FILE, json.dumps(plain(info), indent=1, allow_nan=False) + "\n")
+            put_whole(self.path / BATCH_FILE, json_text(plain(info)))
 
     def write_table(self, name: str, table: pa.Table) -> None:
         """Write a table, as a whole."""
@@ -214,7 +214,7 @@ class Store:
         with reported(self.path):
             try:
                 draft.unlink(missing_ok=True)  # not what a link leads to
-                pq.write_table(table, draft, compression="zstd", write_page_checksum=True)
+                write_parquet(table, draft)
                 draft.replace(self.path / name)
             except OSError:
                 draft.unlink(missing_ok=True)
@@ -238,10 +238,6 @@ class Store:
                 file.parent.mkdir(parents=True, exist_ok=True)
                 file.write_bytes(content)
             draft.replace(target)
-
-    def played(self) -> pa.Table:
-        """Finished runs that are not in the tables, in the order in which they ended."""
-        return read_played(self.path)[0]
 
     def add(self, finished: Finished) -> None:
         """Append a finished run."""
@@ -327,25 +323,26 @@ def read_info(path: Path) -> dict[str, Any]:
 
 
 def read_played(path: Path) -> tuple[pa.Table, list[str]]:
-    """Finished runs that are not in the tables yet, and notes on what is missing; of a truncated file the whole rows are read.
+    """Finished runs that are not in the tables yet, and notes on what is damaged; of each file the intact rows are read.
 
     Raises:
         BatchError: A file holds something else.
     """
     parts, notes = [PLAYED.empty_table()], list[str]()
     for file in sorted((path / PARTS).glob("*.arrow")):
-        batches = list(read_batches(file, notes, BatchError, PLAYED, RULES))
+        batches = list(read_batches(file, [], BatchError, PLAYED, RULES, damage=notes))
         parts.append(pa.Table.from_batches(batches, PLAYED).combine_chunks())
     return pa.concat_tables(parts), notes
 
 
-def read_table(path: Path, name: str, columns: pa.Schema) -> pa.Table | None:
-    """A table of a batch directory; None where there is none.
+def read_table(path: Path, name: str, columns: pa.Schema, notes: list[str] | None = None) -> pa.Table | None:
+    """A table of a batch directory, without its damaged parts; None where there is none.
 
     Args:
         path: The directory.
         name: Of the file.
         columns: Columns that it has at least.
+        notes: Receives a line if it is damaged; None if that is an error.
 
     Raises:
         BatchError: It cannot be read, or is another table.
@@ -353,7 +350,7 @@ def read_table(path: Path, name: str, columns: pa.Schema) -> pa.Table | None:
     file = path / name
     if not file.exists():
         return None
-    table = read_parquet(file, columns, BatchError)
+    table = read_parquet(file, columns, BatchError, notes=notes)
     check_values(zip(table.column_names, table.columns, strict=True), RULES, file, BatchError)
     return table
 
@@ -391,20 +388,46 @@ def load(path: str | Path) -> StoredBatch:
     played, notes = read_played(path)
     if info["is_complete"] and not (path / RESULTS_FILE).exists():
         raise BatchError(f"{path}: {RESULTS_FILE} is not there, though the batch was complete")
-    results, alive = merged(path, played, design)
+    results, alive = merged(path, played, design, notes)
     n = len(pc.unique(results["run"]))
     if not info["is_complete"]:
-        notes = [f"the batch is not complete: {n} of {design.num_rows} runs are finished"]
+        notes.insert(0, f"the batch is not complete: {n} of {design.num_rows} runs are finished")
+    elif notes:
+        notes.append(
+            f"{n} of {design.num_rows} runs are intact; the command of the batch plays the others again"
+        )
     return StoredBatch(path, info, design, results, alive, notes)
 
 
-def merged(path: Path, played: pa.Table, design: pa.Table) -> tuple[pa.Table, pa.Table]:
-    """The tables of a directory, with the runs that are not in them yet.
+def damage(path: Path) -> list[str]:
+    """Describe what is damaged in the tables of a directory, one line each.
 
     Raises:
-        BatchError: A table cannot be read, or is missing.
+        BatchError: A table is another one.
     """
-    old, old_alive = read_table(path, RESULTS_FILE, RESULTS), read_table(path, ALIVE_FILE, ALIVE)
+    notes: list[str] = []
+    for name, columns in ((DESIGN_FILE, DESIGN), (RESULTS_FILE, RESULTS), (ALIVE_FILE, ALIVE)):
+        read_table(path, name, columns, notes)
+    return notes
+
+
+def merged(path: Path, played: pa.Table, design: pa.Table, notes: list[str]) -> tuple[pa.Table, pa.Table]:
+    """The tables of a directory, with the runs that are not in them yet, and without those that are damaged in one of the two.
+
+    Args:
+        path: The directory.
+        played: Finished runs of the parts.
+        design: The planned runs.
+        notes: Receives a line for each table that is damaged.
+
+    Raises:
+        BatchError: A table is another one, or is missing.
+    """
+    old = read_table(path, RESULTS_FILE, RESULTS, notes)
+    n_notes = len(notes)
+    old_alive = read_table(path, ALIVE_FILE, ALIVE, notes)
+    if old is not None and old_alive is not None and len(notes) > n_notes:
+        old = old.filter(pc.is_in(old["run"], pc.unique(old_alive["run"]).cast(pa.int64())))
     if old is not None and old_alive is None:
         raise BatchError(f"{path}: {ALIVE_FILE} is not there, but {RESULTS_FILE} is; the batch is damaged")
     for table, name in ((old, RESULTS_FILE), (old_alive, ALIVE_FILE)):
@@ -416,7 +439,10 @@ def merged(path: Path, played: pa.Table, design: pa.Table) -> tuple[pa.Table, pa
     # Each by its own runs: a batch that was killed at its end may have written one of the two.
     results = _with_new(old, results, ("run", "team", "metric"))
     check_metrics(results, path / RESULTS_FILE)
-    return results, _with_new(old_alive, alive, ("run", "t", "team"))
+    alive = _with_new(old_alive, alive, ("run", "t", "team"))
+    return results, alive.filter(
+        pc.is_in(alive["run"], pc.unique(results["run"]).cast(pa.int64()))
+    ) if notes else alive
 
 
 def _with_new(old: pa.Table | None, new: pa.Table, order: tuple[str, ...]) -> pa.Table:

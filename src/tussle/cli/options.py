@@ -158,7 +158,7 @@ class PluginOptions:
 
 @dataclass(frozen=True, kw_only=True)
 class MissionOptions(PluginOptions):
-    """Check a mission: read it, build its game, and report all errors. Of a folder, check all missions and show a table."""
+    """Check a mission: read it, build its game, and report all errors; the missions of a folder: show a table; a run or batch: report damage."""
 
     mission: Annotated[
         str,

@@ -25,11 +25,12 @@ from tussle.cli.play_options import ConvertOptions, RunOptions
 from tussle.cli.progress import ProgressMeter, compiling
 from tussle.cli.summary import Speed, show_summary
 from tussle.cli.tables import text_table
-from tussle.cli.terminal import OK, WRONG_INPUT, out, say, say_note
+from tussle.cli.terminal import OK, WRONG_INPUT, out, say, say_error, say_note
 from tussle.displays import counted
 from tussle.engine.simulation import Simulation
 from tussle.errors import BatchError, MissionError, ParameterError, RecordError, TussleError, WiringError
 from tussle.mission import Loaded, Mission, to_python, to_xml
+from tussle.record.schema import RUN_FILE, TRAJECTORY_FILE
 
 if TYPE_CHECKING:
     from tussle.batch.reload import PlannedRun
@@ -77,12 +78,15 @@ def record(
 
 
 def check(options: MissionOptions) -> int:
-    """Build the game of a mission and show its size; of a folder, build all its missions and show which can be played.
+    """Build the game of a mission and show its size, or of all missions of a folder. Compare a run or batch with its checksums.
 
     Returns:
         The exit code.
     """
-    if Path(options.mission).is_dir():
+    path = Path(options.mission)
+    if any((path / name).exists() for name in ("batch.json", RUN_FILE, TRAJECTORY_FILE)):
+        return _check_directory(path)
+    if path.is_dir():
         return check_folder(options)
     loaded, mission, seed = options.read(shows_viewer_notes=True)
     with compiling(), simulate(loaded, mission, seed) as simulation:
@@ -138,6 +142,21 @@ def awaited(mission: Mission) -> list[str]:
     """The programs and devices outside of tussle that a mission needs."""
     plugins = (each for plugin in mission.plugins for each in plugin.walk())
     return list(dict.fromkeys(filter(None, (plugin.awaited for plugin in plugins))))
+
+
+def _check_directory(path: Path) -> int:
+    from tussle.batch.damage import damage_in_batch
+    from tussle.record.damage import damage_in_run
+
+    damage, unchecked = (damage_in_batch if (path / "batch.json").exists() else damage_in_run)(path)
+    for line in unchecked:
+        say_note(f"{line}; an older version wrote it")
+    for line in damage:
+        say_error(f"{path}: {line}")
+    if damage:
+        return WRONG_INPUT
+    out().print(f"{path} is intact", soft_wrap=True)
+    return OK
 
 
 def convert(options: ConvertOptions) -> None:

@@ -24,6 +24,9 @@ WIDEST = 100
 OK, WRONG_INPUT, USAGE, PLUGIN_FAILED, NOT_WRITTEN, RUNS_FAILED, OWN_FAULT = 0, 1, 2, 3, 4, 5, 70
 INTERRUPTED, TERMINATED = 130, 143
 
+MAX_LINE = 4000
+"""Characters of a line that are shown, about a screen: names and texts of a mission may be as long as its file."""
+
 EXIT_CODES = {
     OK: "success",
     WRONG_INPUT: "error in the mission, a setting or a plugin file",
@@ -57,13 +60,25 @@ class PlainConsole(Console):
 
     def render_str(self, text: str, **options: Any) -> Text:
         """Render a string with visible control characters."""
-        return super().render_str(visible(text), **options)
+        return super().render_str(_shown(text), **options)
 
     def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterable[Segment]:
         """Render any output, including tables and bars, with visible control characters."""
-        if isinstance(renderable, Text) and (shown := visible(renderable.plain)) != renderable.plain:
+        if isinstance(renderable, Text) and (shown := _shown(renderable.plain)) != renderable.plain:
             renderable = renderable.blank_copy(shown)
         return super().render(renderable, options)
+
+
+def _shown(text: str) -> str:
+    """A text with visible control characters; of a very long line, its beginning."""
+    if len(text) > MAX_LINE:
+        lines = (line if len(line) <= MAX_LINE else _shortened(line) for line in text.split("\n"))
+        text = "\n".join(lines)
+    return visible(text)
+
+
+def _shortened(line: str) -> str:
+    return f"{line[:MAX_LINE]}… and {len(line) - MAX_LINE:,} more characters"
 
 
 def _console(stderr: bool) -> Console:

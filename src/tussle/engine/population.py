@@ -255,7 +255,7 @@ class Population:
             self._call(group, group.motion, rows, group.from_body, rows)
             for binding in group.walk():
                 opened = self._open_handles(group, binding, rows) if binding.handles else rows
-                if type(binding.plugin).spawn is not EntityPlugin.spawn:
+                if len(opened) and type(binding.plugin).spawn is not EntityPlugin.spawn:
                     self._call(group, binding, rows, binding.plugin.spawn, binding.view, opened)
 
     def _call(

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import os
 import re
-import stat
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from tussle import stock
+from tussle.documents import size_of
 from tussle.errors import MissionError, listed, nearest_name
 from tussle.mission.node import Budget, Node, parse
 from tussle.mission.placeholders import replace_placeholders
@@ -80,9 +80,7 @@ def read_text(path: Path, budget: Budget) -> str:
         MissionError: It cannot be read or decoded, or is too long.
     """
     try:
-        # Opening a pipe or a device can block forever.
-        if not stat.S_ISREG(path.stat().st_mode):
-            raise MissionError(f"{path}: it is not a regular file")
+        size_of(path)  # refuses pipes and devices
         with path.open("rb") as file:
             data = file.read(budget.limits.text + 1)
     except (OSError, ValueError) as error:

@@ -224,13 +224,15 @@ class Block:
         return displayed.block_html(self)
 
 
+FARTHEST = 1e9
+"""Largest coordinate of a block [m]: positions there are good to a micrometre, so that entities still move."""
 BLOCK_VALUES = _declared(
     Block,
     team={},
     count={"ge": 0},
-    position={"unit": "m", "fields": "x y z"},
-    variance={"unit": "m^2", "fields": "x y z", "ge": 0.0},
-    half_width={"unit": "m", "fields": "x y z", "ge": 0.0},
+    position={"unit": "m", "fields": "x y z", "ge": -FARTHEST, "le": FARTHEST},
+    variance={"unit": "m^2", "fields": "x y z", "ge": 0.0, "le": FARTHEST**2},
+    half_width={"unit": "m", "fields": "x y z", "ge": 0.0, "le": FARTHEST},
     placement={"choices": PLACEMENTS},
     scatter_first={},
     heading={"unit": "rad", "text_unit": "deg"},
@@ -360,7 +362,8 @@ class Mission:
             Cadence.of(plugin, 1.0 / self.dt, 1, "mission")
 
     def _check_needs(self) -> None:
-        """Check that the regions that plugins name and the services that they call exist."""
+        """Check that the regions and blocks that plugins name and the services that they call exist."""
+        blocks = [block.name for block in self.blocks]
         regions = [region for plugin in self.world_plugins for region in plugin.regions()]
         of_world = {service for plugin in self.world_plugins for service in plugin.services}
         owners = [("mission", self.world_plugins), *((f"block {b.name!r}", b.plugins) for b in self.blocks)]
@@ -371,6 +374,11 @@ class Mission:
                 try:
                     for boundary in plugin.named_regions():
                         find_region(regions, boundary)
+                    for name in plugin.named_blocks():
+                        if name not in blocks:
+                            raise MissionError(
+                                f"there is no block {name!r}{nearest_name(name, blocks)}; {listed(blocks)}"
+                            )
                     for service in plugin.needed_services:
                         if service not in services:
                             raise MissionError(missing_service(service, services))

@@ -5,12 +5,12 @@ from __future__ import annotations
 import io
 import json
 import re
-import stat
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from tussle.documents import read_bytes
 from tussle.errors import MissingExtraError, ParameterError, listed, nearest_name
 from tussle.rays.grids import read_ascii_grid, read_image
 from tussle.rays.surfaces import MOST_FACES, HeightField, TriangleMesh
@@ -58,7 +58,7 @@ def read_surface(
         if suffix == ".asc":
             found: HeightField | TriangleMesh = read_ascii_grid(path, data)
         elif suffix in IMAGES:
-            found = read_image(path, cell, height)
+            found = read_image(path, data, cell, height)
         else:
             vertices, faces = read_vtk(data) if suffix == ".vtk" else _by_trimesh(path, data)
             found = TriangleMesh(vertices * scale + np.array(position), faces)
@@ -86,19 +86,21 @@ def bytes_of(path: Path) -> bytes:
     Raises:
         ParameterError: It is no such file.
     """
-    try:
-        status = path.stat()
-        if not stat.S_ISREG(status.st_mode):  # opening a pipe or a device can block forever
-            raise ParameterError(f"{path}: it is not a regular file")
-        if status.st_size > MOST_BYTES:
-            raise ParameterError(f"{path}: the file has more than {MOST_BYTES // 1_000_000} MB")
-        return path.read_bytes()
-    except (OSError, ValueError) as error:
-        if isinstance(error, ParameterError):
-            raise
+    return read_bytes(path, ParameterError, MOST_BYTES)
+
+
+def corners(vertices: Any) -> np.ndarray:
+    """Vertices of a mesh as they come from the reader of another package, (n, 3).
+
+    Raises:
+        ParameterError: They are something else.
+    """
+    found = np.asarray(vertices, float)
+    if found.ndim != 2 or found.shape[1] != 3:
         raise ParameterError(
-            f"{path}: the file cannot be read: {getattr(error, 'strerror', None) or error}"
-        ) from None
+            f"its vertices have shape {found.shape}; a mesh takes (n, 3), which is x, y and z of each"
+        )
+    return found
 
 
 def _announced(suffix: str, data: bytes) -> int:
@@ -140,7 +142,7 @@ def _by_trimesh(path: Path, data: bytes) -> tuple[np.ndarray, np.ndarray]:
         made: Any = trimesh.load(
             io.BytesIO(data), file_type=suffix[1:], force="mesh", process=False, skip_materials=True
         )
-        return np.asarray(made.vertices, float), np.asarray(made.faces)
+        return corners(made.vertices), np.asarray(made.faces)
     except ParameterError:
         raise
     except Exception as error:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from pathlib import Path
 from typing import Any
 
@@ -86,11 +87,12 @@ def _filled(path: Path, height: np.ndarray, no_data: float) -> np.ndarray:
     return np.where(missing, height[~missing].min(), height)
 
 
-def read_image(path: Path, cell: float | None, white: float | None) -> HeightField:
+def read_image(path: Path, data: bytes, cell: float | None, white: float | None) -> HeightField:
     """A PNG or TIFF: one height for each pixel, the upper edge in the north; its first pixel is at x = y = 0 of the field.
 
     Args:
-        path: The file.
+        path: The file, for messages.
+        data: Its content.
         cell: Width of a pixel [m]; None for a GeoTIFF, which has its own.
         white: Height of the brightest value that the format can hold above 0 [m]; None for a TIFF of heights in m.
 
@@ -103,7 +105,7 @@ def read_image(path: Path, cell: float | None, white: float | None) -> HeightFie
     except ImportError:
         raise MissingExtraError(f"{path}: images need Pillow: pip install 'tussle[maps]'") from None
     try:
-        with Image.open(path, formats=("PNG", "TIFF")) as image:
+        with Image.open(io.BytesIO(data), formats=("PNG", "TIFF")) as image:
             _check_size(
                 path, *image.size, 1.0 if cell is None else cell
             )  # the header's size, before pixels are read

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from tussle.errors import ParameterError, TussleError
-from tussle.rays.files import BY_TRIMESH, bytes_of
+from tussle.rays.files import BY_TRIMESH, bytes_of, corners
 from tussle.rays.surfaces import MeshPart
 from tussle.rays.textures import decoded, reduced
 
@@ -83,7 +83,7 @@ def _parts(
             if len(images) == MOST_IMAGES:
                 raise ParameterError(f"{path}: the mesh has more than {MOST_IMAGES} images")
             images[key] = reduced(str(path), image)
-        vertices = trimesh.transform_points(mesh.vertices, matrix) * scale + np.array(position)
+        vertices = trimesh.transform_points(corners(mesh.vertices), matrix) * scale + np.array(position)
         piece, has_colours = _piece(mesh, vertices, bool(key))
         pieces.setdefault(key, []).append(piece)
         is_coloured = is_coloured or has_colours

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from pathlib import Path
+from typing import BinaryIO
 
 import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
+from tussle.displays import counted
 from tussle.documents import size_of
 from tussle.errors import TussleError
 from tussle.record.arrow_file import same_columns
+from tussle.record.parquet_blocks import intact_groups
 from tussle.record.parquet_sizes import Sizes, sizes_of
 
 MOST_EXPANSION = 1000
@@ -30,8 +33,9 @@ def read_parquet(
     error: type[TussleError],
     only: Collection[str] | None = None,
     most_rows: int = 2**40,
+    notes: list[str] | None = None,
 ) -> pa.Table:
-    """Read a table.
+    """Read a table, without its damaged row groups.
 
     Args:
         path: The file.
@@ -39,6 +43,7 @@ def read_parquet(
         error: Class of the errors that are raised.
         only: Names of the columns to read, if present; None for all.
         most_rows: Maximum number of rows.
+        notes: Receives a line if row groups are damaged, or if the file cannot be read; None if that is an error.
 
     Raises:
         TussleError: As `error`: the file is not a regular file, is not such a table, is damaged, or takes too much memory for its
@@ -48,7 +53,8 @@ def read_parquet(
         size = size_of(path)
         most = MARGIN + MOST_EXPANSION * size
         with path.open("rb") as opened:
-            sizes = sizes_of(opened, size)
+            groups = _intact_groups(path, opened, size, error, notes)
+            sizes = sizes_of(opened, size, groups)
         if problem := _too_large(sizes, most, most_rows):
             raise error(f"{path}: {problem}")
         with pq.ParquetFile(path) as file:
@@ -60,8 +66,11 @@ def read_parquet(
             raise error(f"{path}: {problem}")
         texts = [name for name in names if _is_text(schema.field(name).type)]
         with pq.ParquetFile(path, read_dictionary=texts, page_checksum_verification=True) as file:
-            return _decoded(file, pa.schema([schema.field(name) for name in names]), most)
+            return _decoded(file, pa.schema([schema.field(name) for name in names]), most, groups)
     except (OSError, ValueError, TypeError, KeyError, pa.ArrowException) as reason:
+        if notes is not None:
+            notes.append(f"{path.name} cannot be read: {reason}")
+            return wanted.empty_table()
         raise error(f"{path}: cannot be read: {reason}") from None
 
 
@@ -98,14 +107,35 @@ def _too_large(sizes: Sizes, most: int, most_rows: int) -> str:
     )
 
 
-def _decoded(file: pq.ParquetFile, schema: pa.Schema, most: int) -> pa.Table:
+def _intact_groups(
+    path: Path, file: BinaryIO, size: int, error: type[TussleError], notes: list[str] | None
+) -> list[int] | None:
+    """Row groups whose checksums match; None if the file has no checksums.
+
+    Raises:
+        TussleError: As `error`: a row group is damaged, and there are no notes to tell it.
+        ValueError: The footer is damaged.
+    """
+    found = intact_groups(file, size)
+    if found is None:
+        return None
+    intact, n = found
+    if len(intact) < n:
+        damage = f"{path.name} is damaged: the checksums of {n - len(intact)} of {counted(n, 'row group')} do not match"
+        if notes is None:
+            raise error(f"{path.parent}: {damage}")
+        notes.append(damage)
+    return intact
+
+
+def _decoded(file: pq.ParquetFile, schema: pa.Schema, most: int, groups: list[int] | None) -> pa.Table:
     """Decode the rows in batches; texts stay dictionary-encoded until their size is known.
 
     Raises:
         ValueError: They take too much memory.
     """
     batches, left = [], most
-    for batch in file.iter_batches(AT_ONCE, columns=schema.names):
+    for batch in file.iter_batches(AT_ONCE, row_groups=groups, columns=schema.names):
         batch.validate(full=True)
         left -= sum(_length(column) for column in batch.columns)
         if left < 0:

@@ -7,7 +7,7 @@ those of parquet.thrift (Apache Parquet 2.9), encoded in Thrift's compact protoc
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from typing import Any, BinaryIO
 
@@ -41,12 +41,13 @@ class Sizes:
     largest: int = 0
 
 
-def sizes_of(file: BinaryIO, size: int) -> Sizes:
+def sizes_of(file: BinaryIO, size: int, only: Collection[int] | None = None) -> Sizes:
     """Read the sizes that a file declares.
 
     Args:
         file: The file.
         size: Its size [B].
+        only: Numbers of the row groups that are read; None for all.
 
     Raises:
         ValueError: It is not a Parquet file, or is damaged.
@@ -62,7 +63,9 @@ def sizes_of(file: BinaryIO, size: int) -> Sizes:
         found = Sizes(max(footer[ROWS], sum(group[GROUP_ROWS] for group in groups)))
         values: dict[int, int] = {}
         n_pages = 0
-        for group in groups:
+        for number, group in enumerate(groups):
+            if only is not None and number not in only:
+                continue
             for i, column in enumerate(group[COLUMNS]):
                 for n, page in _pages(file, column, size):
                     n_pages += 1

@@ -111,6 +111,7 @@ class Recorder:
         self._rows: RowSelection
         self._common_step = -1
         self._steps = np.full(sim.n_worlds, -1, np.int64)
+        self._others: list[str] = []
         self._open(mission_text, shapes, scene_files or {})
         self._flush_at = time.monotonic() + flush_every
         self._begin()
@@ -126,11 +127,13 @@ class Recorder:
             mission_text = mission_text or self._written_back()
             if mission_text:
                 (self.directory / MISSION_FILE).write_text(mission_text, encoding="utf-8")
+                self._others.append(MISSION_FILE)
             for name, file in scene_files.items():
                 place = self.directory / name
                 if place.resolve().is_relative_to(self.directory.resolve()) and name not in FILES:
                     place.parent.mkdir(parents=True, exist_ok=True)
                     shutil.copyfile(file, place)
+                    self._others.append(name)
         except OSError as error:
             raise RecordError(
                 f"{self.directory}: cannot record a run there: {error.strerror or error}"
@@ -300,6 +303,7 @@ class Recorder:
             sim,
             self._timings,
             self._streams,
+            [*self._others, *self._traffic.file_names],
             {
                 "period": self.period,
                 "parameters": self.parameters,

@@ -13,10 +13,11 @@ import pyarrow as pa
 import pyarrow.csv
 
 from tussle.displays import MAX_LINE, counted, line, listing, page, shortened, table
-from tussle.documents import read_text
+from tussle.documents import DAMAGED, MOST_BYTES, read_text
 from tussle.errors import MissingExtraError, ParameterError, RecordError, listed, nearest_name
 from tussle.mission.limits import Limits
 from tussle.record.arrow_file import read_batches
+from tussle.record.run_file import crc_of_file
 from tussle.record.schema import (
     EVENTS,
     EVENTS_FILE,
@@ -90,6 +91,9 @@ class Run:
         try:
             self.info = RUN.read(path)
         except RecordError as error:
+            if RUN.is_damaged(path):
+                self.notes.append(f"{RUN_FILE} {DAMAGED}; the tables are read as those of an incomplete run")
+                return
             raise RecordError(
                 f"{error}; if the file is removed, the tables are read as those of an incomplete run"
             ) from None
@@ -98,7 +102,7 @@ class Run:
 
     def _read_table(self, name: str, schema: pa.Schema, rules: Rules, is_mapped: bool) -> pa.Table:
         path, notes = self.path / name, list[str]()
-        batches = read_batches(path, notes, RecordError, schema, rules, is_mapped=is_mapped)
+        batches = read_batches(path, notes, RecordError, schema, rules, is_mapped=is_mapped, damage=notes)
         table = pa.Table.from_batches(batches, schema)
         written = self.info.get("files", {}).get(name)
         if not notes and written is not None:
@@ -146,7 +150,7 @@ class Run:
         path = self.path / SUMMARY_FILE
         if not path.exists():
             raise RecordError(f"{path} is missing: {'; '.join(self.notes) or 'it was removed'}")
-        text = read_text(path, RecordError)
+        text = self._text(path)
         try:
             table = pyarrow.csv.read_csv(io.BytesIO(text.encode()), convert_options=SUMMARY)
         except pa.ArrowException as error:
@@ -159,7 +163,19 @@ class Run:
     def mission(self) -> str | None:
         """Text of the mission file with all its values; None if a mission file cannot hold it."""
         path = self.path / MISSION_FILE
-        return read_text(path, RecordError, Limits.large().text) if path.exists() else None
+        return self._text(path, Limits.large().text) if path.exists() else None
+
+    def _text(self, path: Path, most: int = MOST_BYTES) -> str:
+        """The text of a file.
+
+        Raises:
+            RecordError: It cannot be read, or is damaged.
+        """
+        text = read_text(path, RecordError, most)
+        written = (self.info.get("checksums") or {}).get(path.name)
+        if written is not None and crc_of_file(path) != written:
+            raise RecordError(f"{path}: is damaged: its checksum is not that in {RUN_FILE}")
+        return text
 
     def _frame(self, table: pa.Table) -> Any:
         return frame_of(table, self._frames)

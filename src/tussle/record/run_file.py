@@ -5,13 +5,12 @@ from __future__ import annotations
 import csv
 import datetime as dt
 import io
-import json
 import math
 import os
 import platform
 import sys
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
 from importlib import metadata
 from pathlib import Path
@@ -19,6 +18,8 @@ from typing import Any
 
 import numpy as np
 
+from tussle.checksums import as_digits, crc_of_part
+from tussle.documents import json_text, size_of
 from tussle.errors import RecordError
 from tussle.record.schema import FORMAT, RUN_FILE, SUMMARY_FILE
 from tussle.record.stream import Stream
@@ -56,7 +57,12 @@ def _version(name: str) -> str:
 
 
 def write(
-    directory: Path, sim: Any, timings: Timings, streams: Sequence[Stream], about: Mapping[str, Any]
+    directory: Path,
+    sim: Any,
+    timings: Timings,
+    streams: Sequence[Stream],
+    others: Iterable[str],
+    about: Mapping[str, Any],
 ) -> None:
     """Write both files.
 
@@ -65,6 +71,7 @@ def write(
         sim: The simulation, see `recorder.Recorded`.
         timings: Of the recording.
         streams: Files whose sizes are listed in `run.json`.
+        others: Names of further files, whose checksums are listed there.
         about: Further values of `run.json`; "interrupted" is the reason why the run is incomplete, or "".
 
     Raises:
@@ -72,7 +79,7 @@ def write(
     """
     mission = sim.mission
     results = sim.result()
-    info = {
+    info: dict[str, Any] = {
         "format": FORMAT,
         "is_complete": not about["interrupted"],
         **about,
@@ -89,11 +96,23 @@ def write(
     }
     try:
         put_whole(directory / SUMMARY_FILE, _summary(results))
-        put_whole(directory / RUN_FILE, json.dumps(plain(info), indent=1, allow_nan=False) + "\n")
+        info["checksums"] = {name: crc_of_file(directory / name) for name in sorted({SUMMARY_FILE, *others})}
+        put_whole(directory / RUN_FILE, json_text(plain(info)))
     except OSError as error:
         raise RecordError(
             f"{directory}: the end of the run cannot be written: {os.strerror(error.errno or 0)}"
         ) from error
+
+
+def crc_of_file(path: Path) -> str:
+    """CRC-32 of a file, as `run.json` and `batch.json` list it.
+
+    Raises:
+        OSError: It cannot be read, or is not a regular file.
+    """
+    size = size_of(path)
+    with path.open("rb") as file:
+        return as_digits(crc_of_part(file, 0, 0, size)).decode()
 
 
 def put_whole(path: Path, text: str) -> None:

@@ -137,6 +137,7 @@ RUN = Document(
         "worlds": [_WORLD],
         "versions": Map(str),
         "files": Map({"bytes": Whole(), "rows": Whole()}),
+        "checksums": Maybe(Map(str)),
     },
     RecordError,
 )

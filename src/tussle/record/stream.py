@@ -8,10 +8,11 @@ from pathlib import Path
 import pyarrow as pa
 
 from tussle.errors import RecordError
+from tussle.record.arrow_blocks import END_MARK, sealed_blocks
 
 
 class Stream:
-    """An Arrow stream in a file. When `write` returns, the batch is with the operating system.
+    """An Arrow stream in a file, in blocks with checksums. When `write` returns, the batch is with the operating system.
 
     Raises:
         RecordError: The file cannot be created or written. Batches written before stay intact.
@@ -21,16 +22,19 @@ class Stream:
         self.path = path
         self.rows = 0
         self._end = 0
+        self._schema = schema
         try:
             self._file = pa.OSFile(str(path), "wb")
-            self._writer = pa.ipc.new_stream(self._file, schema)  # writes nothing before the first batch
         except OSError as error:
             raise self._failed(error) from error
 
     def write(self, batch: pa.RecordBatch) -> None:
         """Append a batch."""
+        schema, block = sealed_blocks(batch)
         try:
-            self._writer.write_batch(batch)
+            if not self._end:
+                self._file.write(schema)
+            self._file.write(block)
             self._end = self._file.tell()
         except OSError as error:
             self._truncate()
@@ -42,7 +46,9 @@ class Stream:
         if self._file.closed:
             return
         try:
-            self._writer.close()
+            if not self._end:
+                self._file.write(sealed_blocks(pa.RecordBatch.from_pylist([], self._schema))[0])
+            self._file.write(END_MARK)
             self._file.close()
         except OSError as error:
             self._truncate()

@@ -126,6 +126,11 @@ class Traffic:
             if topic not in ("*", *known[network])
         ]
 
+    @property
+    def file_names(self) -> list[str]:
+        """Names of the CSV files."""
+        return [Path(monitor.file.name).name for monitor in self._monitors.values()]
+
     def close(self) -> None:
         for monitor in self._monitors.values():
             monitor.file.close()

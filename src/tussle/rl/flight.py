@@ -12,6 +12,7 @@ import numpy as np
 
 from tussle import rng
 from tussle.api import GroupView
+from tussle.documents import read_bytes
 from tussle.errors import MissingExtraError, ParameterError, listed, nearest_name
 from tussle.rl.action import Actor, Decoder, learned
 from tussle.rl.observation import AgentRows, Computed
@@ -84,8 +85,9 @@ class Policy:
             raise self._refused("there is no such file; it takes an ONNX file")
         if path.stat().st_size > MOST_BYTES:
             raise self._refused(f"it has more than {MOST_BYTES // 2**20} MiB")
+        data = read_bytes(path, ParameterError, MOST_BYTES)
         try:
-            model = onnx.load_model(path, format="protobuf", load_external_data=False)
+            model = onnx.load_model_from_string(data)
         except Exception:  # noqa: BLE001 - a class of protobuf, which onnx does not export
             model = None
         if model is None or not model.graph.node:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import json
 import math
-import threading
 import time
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
@@ -18,6 +17,7 @@ from tussle.errors import MissingExtraError, ParameterError, TussleError, listed
 from tussle.serve.session import ENCODINGS, Session, encoded
 from tussle.view.pacing import Pace, checked_warp
 from tussle.view.page.access import MOST_BROWSERS, Access, bound_socket
+from tussle.view.page.web_server import WebServer
 
 if TYPE_CHECKING:
     from aiohttp import web
@@ -99,18 +99,18 @@ class Server:
         self._bound = bound_socket(host, port)
         self._access = Access(host, self._bound.getsockname()[1])
         self.url = self._access.url.replace("http", "ws", 1)
-        is_up = threading.Event()
-        self._thread = threading.Thread(
-            target=lambda: asyncio.run(self._serve(is_up)), name="tussle serve", daemon=True
-        )
-        self._thread.start()
-        is_up.wait()
+        self._turn, self._can_play = asyncio.Lock(), asyncio.Event()
+        try:
+            self._server = WebServer(
+                self._bound, self._admit, "tussle serve", beside=[self._play], before_end=self._close_clients
+            )
+        except BaseException:
+            self._executor.shutdown()
+            raise
 
     def stop(self) -> None:
         """Stop serving; the simulation stays. A second call does nothing."""
-        if self._thread.is_alive():
-            self._loop.call_soon_threadsafe(self._stopping.set)
-            self._thread.join(10.0)
+        self._server.stop()
         self._executor.shutdown()
 
     def __enter__(self) -> Self:
@@ -121,23 +121,9 @@ class Server:
 
     # -- the server ---------------------------------------------------------------------------------------------------------------
 
-    async def _serve(self, is_up: threading.Event) -> None:
-        from aiohttp import web
-
-        self._loop, self._stopping = asyncio.get_running_loop(), asyncio.Event()
-        self._turn, self._can_play = asyncio.Lock(), asyncio.Event()
-        app = web.Application()
-        app.router.add_get("/{tail:.*}", self._admit)
-        runner = web.AppRunner(app, access_log=None, handle_signals=False, shutdown_timeout=0.1)
-        await runner.setup()
-        await web.SockSite(runner, self._bound).start()
-        player = asyncio.create_task(self._play())
-        is_up.set()
-        await self._stopping.wait()
-        player.cancel()
+    async def _close_clients(self) -> None:
         for client in list(self._clients):
             await client.socket.close()
-        await runner.cleanup()
 
     async def _admit(self, request: web.Request) -> web.StreamResponse:
         from aiohttp import web
@@ -226,7 +212,7 @@ class Server:
     async def _turned(self, function: Callable[[], T]) -> T:
         """Call a function between two steps, in the thread of the simulation."""
         async with self._turn:
-            return await self._loop.run_in_executor(self._executor, function)
+            return await asyncio.get_running_loop().run_in_executor(self._executor, function)
 
     def _subscribe(self, client: Client, paths: Any, every: int, encoding: str) -> dict[str, Any]:
         wanted = (paths,) if isinstance(paths, str) else tuple(paths)
@@ -278,6 +264,7 @@ class Server:
 
     async def _play(self) -> None:
         """Make steps while the game is not paused."""
+        self._loop = asyncio.get_running_loop()
         while True:
             await self._can_play.wait()
             pace, simulation = self._pace, self._simulation

@@ -171,12 +171,14 @@ def _missions(
     slots = _slots(plugin, companions, publishes, subscribes)
     mixed = {name: _swapped(value, plugin, varied) for name, value in slots.items()}
     blocks = [_block("red", 1, slots), _block("blue", 2, mixed), _block("late", 1, slots)]
+    named = {name for one in all_ for inner in one.walk() for name in inner.named_blocks()}
+    spare = [Block(name=name, count=0, **slots) for name in sorted(named - {block.name for block in blocks})]
     path = plugin.instance_name
     if isinstance(plugin, Behavior):
         path = f"MotorSchemas.{path}"
     paths = (path,) if isinstance(plugin, WorldPlugin) else tuple(f"{b.name}.{path}" for b in blocks)
     mission = Mission(
-        blocks=blocks,
+        blocks=[*blocks, *spare],
         dt=0.1,
         end=0.1 * STEPS,
         motion_multiplier=2,
@@ -186,7 +188,7 @@ def _missions(
         networks=networks,
         name=f"conformance of {plugin.instance_name}",
     )
-    quiet = mission.replace(blocks=blocks[:2], interactions=mission.interactions[:-1])
+    quiet = mission.replace(blocks=[*blocks[:2], *spare], interactions=mission.interactions[:-1])
     return ConformanceGame(plugin, mission, quiet, paths if len(paths) == 1 else paths[:2])
 
 

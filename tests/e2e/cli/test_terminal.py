@@ -71,3 +71,12 @@ def test_the_first_run_ever_says_that_it_compiles_and_the_next_does_not(folder, 
     assert first.endswith(f" {folder / 'kernels'}")
     assert re.fullmatch(r"compiled \d+ kernels? in \d+\.\d s", last)
     assert not runs[1].stderr
+
+
+def test_a_text_as_long_as_a_file_fills_a_screen_at_most(folder, process):
+    text = (folder / "game.xml").read_text()
+    (folder / "game.xml").write_text(text.replace('name="A small game"', f'name="{"${x=1}" * 100_000}"'))
+    for command in (("run", "game.xml", "--no-log"), ("describe", "game.xml")):
+        done = process(*command)
+        assert len(done.stdout) + len(done.stderr) < 20_000
+        assert "more characters" in done.stdout

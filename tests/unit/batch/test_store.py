@@ -62,7 +62,7 @@ def tables_of(path):
 
 def facts_of(path):
     info = json.loads((path / store.BATCH_FILE).read_text())
-    return {k: v for k, v in info.items() if k not in ("timings", "command")}
+    return {k: v for k, v in info.items() if k not in ("timings", "command", "checksum")}
 
 
 @pytest.fixture

@@ -503,7 +503,7 @@ def test_random_entities_come_and_go_without_a_fault():
         ({"types": ((1, 1, 2, 225, 256, 0, 0, 0),)}, ParameterError, "category = 256 of team 1 is not allowed"),
         ({"types": ((1, 1.5, 2, 225, 0, 0, 0, 0),)}, ParameterError, "kind = 1.5 of team 1 is not allowed"),
         ({"listen_port": 4000}, ParameterError, "listen_port = 4000 needs remote"),
-        ({"remote": "gest"}, MissionError, "remote = 'gest' names no block .did you mean 'guest'"),
+        ({"remote": "gest"}, MissionError, "DIS: there is no block 'gest' .did you mean 'guest'"),
     ],
 )  # fmt: skip
 def test_what_cannot_be_is_refused(values, error, text):

@@ -342,6 +342,18 @@ def test_a_child_that_does_not_start_says_whose_it_was():
         Simulation(game(Missing()))
 
 
+def test_spawn_is_not_called_for_no_rows():
+    class Missing(Outside):
+        def open_one(self, row):
+            raise OSError("no such program")
+
+        def spawn(self, g, rows):
+            assert self.link[rows[0]] is not None
+
+    with pytest.raises(PluginError, match=r"Missing, a 1, world 0.*OSError: no such program"):
+        Simulation(game(Missing()))
+
+
 def test_those_that_did_start_are_closed_when_another_does_not():
     class Third(Outside):
         def open_one(self, row):

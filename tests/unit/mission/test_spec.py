@@ -83,6 +83,8 @@ def test_steps_until_the_end(end, steps):
         ({"position": None}, r"block 'a': position = None is not allowed; it takes 3 values"),
         ({"position": (1, 2, "3 kg")}, r"block 'a': position = '3 kg': .*kg"),
         ({"position": (1, 2, float("nan"))}, r"block 'a': position = nan is not allowed"),
+        ({"position": (1e300, 0, 0)}, r"block 'a': position = 1e\+300 is not allowed; .* <= 1e\+09"),
+        ({"variance": (0, 1e300, 0)}, r"block 'a': variance = 1e\+300 is not allowed"),
         ({"velocity": (1, 2)}, r"block 'a': velocity = \(1, 2\) is not allowed; it takes 3 values"),
         ({"variance": (1, -1, 0)}, r"block 'a': variance = -1 is not allowed"),
         ({"half_width": -1}, r"block 'a': half_width"),

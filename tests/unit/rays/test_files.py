@@ -72,7 +72,7 @@ def test_too_much_is_not_read(tmp_path):
     path = tmp_path / "x.asc"
     with path.open("wb") as file:
         file.truncate(65_000_000)
-    with pytest.raises(ParameterError, match="more than 64 MB"):
+    with pytest.raises(ParameterError, match="the limit is 64,000,000"):
         read_surface(path)
 
 
@@ -225,6 +225,7 @@ def test_meshes_by_trimesh(tmp_path):
         ("a.gltf", b'{"buffers": [{"uri": "../../secret.bin"}]}', "it cannot be read as .gltf"),
         ("a.obj", b"v 0 0 nan\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "coordinate"),
         ("a.obj", b"v 0 0 0\nf 1 2 9\n", "a.obj: "),
+        ("a.obj", b"v 0 0\nv 1 0\nv 0 1\nf 1 2 3\n", r"a.obj: its vertices have shape \(3, 2\)"),
         ("a.ply", b"no mesh", "a.ply: it cannot be read as .ply"),
         ("a.off", b"\xff\xfe", "it cannot be read as .off"),
         ("a.zip", b"PK", "'.zip' is no format of surfaces"),

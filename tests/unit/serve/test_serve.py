@@ -2,7 +2,9 @@
 
 import asyncio
 import base64
+import contextlib
 import json
+import socket
 import subprocess
 import sys
 import threading
@@ -205,6 +207,32 @@ def test_a_client_that_reads_nothing_costs_no_memory(server):
             await asyncio.sleep(0.001)
 
     talk(server, conversation)
+
+
+@pytest.mark.filterwarnings("error")
+def test_garbage_is_refused_in_silence(server, capfd):
+    port = int(server.url.split(":")[2].split("/")[0])
+    for garbage in (
+        b"\x1b]0;x\x07\x1b[31mEVIL " + b"a" * 7000 + b"\r\n\r\n",
+        b"GET / HTTP/1.1\r\nHost: x\r\n" + b"\x1b[31mX: " + b"a" * 99_999,
+    ):
+        # It may be closed before all is sent.
+        with contextlib.suppress(OSError), socket.create_connection(("127.0.0.1", port)) as connection:
+            connection.sendall(garbage)
+            connection.shutdown(socket.SHUT_WR)
+            while connection.recv(4096):
+                pass
+    assert capfd.readouterr() == ("", "")
+    assert "blocks" in talk(server, lambda ask: ask("describe"))
+
+
+def test_a_set_up_that_fails_is_raised(monkeypatch):
+    async def fails(self):
+        raise OSError("no more sockets")
+
+    monkeypatch.setattr(aiohttp.web.SockSite, "start", fails)
+    with Simulation(mission(), seeds=[1]) as simulation, pytest.raises(OSError, match="no more sockets"):
+        Server(simulation)
 
 
 def test_the_error_of_a_plugin_is_answered_and_the_server_goes_on():

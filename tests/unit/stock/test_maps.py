@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 
 import numpy as np
@@ -76,7 +77,12 @@ def test_maps_that_cannot_be_read(tmp_path, monkeypatch):
     text.write_text("no image")
     noise = tmp_path / "noise.pgm"
     noise.write_text("P2 301 300 255 " + "0 255 " * 45_150)
+    os.mkfifo(tmp_path / "pipe.png")
+    drawing = tmp_path / "x.eps"
+    drawing.write_text("%!PS-Adobe-3.0 EPSF-3.0\n%%BoundingBox: 0 0 9 9\n%%EndComments\nshowpage\n%%EOF\n")
     for path, message in (
+        (str(tmp_path / "pipe.png"), "not a regular file"),
+        (str(drawing), "it is no PNG, JPEG, TIFF, BMP, GIF, PPM file"),
         ("maze_2d_1", "MapGen2D.map = 'maze_2d_1' cannot be read.*takes the path of an image"),
         (str(text), "cannot be read"),
         (str(noise), "has .* walls; it may have 20,000"),

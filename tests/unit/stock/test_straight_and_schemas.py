@@ -8,7 +8,7 @@ from small_worlds import Drift, block, mission
 
 from tussle import Simulation, stock
 from tussle.api import Autonomy, Behavior, Children, Interaction, Output, Param, Publish, State
-from tussle.errors import PluginError
+from tussle.errors import MissionError
 from tussle.messages import Waypoint
 from tussle.stock import (
     AvoidEntityMS,
@@ -135,8 +135,8 @@ def test_straight_with_a_template_that_is_not_there():
     parent = block(
         autonomy=Straight(generate_entities=True), controller=UnicyclePID(), motion=Unicycle(vel_max=50.0)
     )
-    with pytest.raises(PluginError, match=r"there is no block 'gen_straight'; there are: a"):
-        Simulation(mission(parent, end=5.0)).run()
+    with pytest.raises(MissionError, match=r"Straight: there is no block 'gen_straight'; there are: a"):
+        mission(parent, end=5.0)
 
 
 class Wish(Behavior):

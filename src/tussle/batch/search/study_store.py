@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import os
 from collections.abc import Mapping, Sequence
@@ -21,7 +20,7 @@ from tussle.batch.search.trials import MOST_TRIALS, Trial, frozen, thawed, trial
 from tussle.batch.store import locked, reported
 from tussle.batch.variables import Variable
 from tussle.batch.varied import variable_of
-from tussle.documents import Document, Map, Maybe, Real, Whole, problem, read_text
+from tussle.documents import Document, Map, Maybe, Real, Whole, json_text, problem, read_text
 from tussle.errors import BatchError
 from tussle.record.run_file import plain, put_whole, versions
 
@@ -111,7 +110,7 @@ class StudyStore:
         """Return the info of the directory; write it if there is none."""
         if not (self.path / STUDY_FILE).exists():
             with reported(self.path):
-                put_whole(self.path / STUDY_FILE, json.dumps(info, indent=1, allow_nan=False) + "\n")
+                put_whole(self.path / STUDY_FILE, json_text(info))
             return info
         before = read_info(self.path)
         if any(before.get(name) != info[name] for name in (*COMPARED, "fingerprint")):

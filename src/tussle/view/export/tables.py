@@ -11,6 +11,7 @@ import pyarrow.compute as pc
 import pyarrow.csv
 import pyarrow.parquet
 
+from tussle.documents import DAMAGED
 from tussle.errors import ParameterError, RecordError, listed, nearest_name
 from tussle.record.arrow_file import read_batches
 from tussle.record.run import run_directory
@@ -82,7 +83,7 @@ def write_tables(
         (EVENTS_FILE, EVENTS, EVENTS_RULES, beside, None),
     )
     for name, schema, rules, file, report_rows in tables:
-        batches = read_batches(place / name, report.notes, RecordError, schema, rules)
+        batches = read_batches(place / name, report.notes, RecordError, schema, rules, damage=report.notes)
         report.rows.append(_write(batches, schema, file, kind, world, report_rows))
         report.paths.append(file)
     return report
@@ -94,6 +95,9 @@ def _check(place: Path, world: int | None, report: TablesReport) -> None:
     Raises:
         RecordError: One of them does not.
     """
+    if RUN.is_damaged(place / RUN_FILE):
+        report.notes.append(f"{RUN_FILE} {DAMAGED}")
+        return
     if (place / RUN_FILE).exists():
         worlds = RUN.read(place / RUN_FILE)["worlds"]
     else:

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import asyncio
 import ipaddress
-import logging
 import os
 import sys
-import threading
 import webbrowser
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Self
 
-from tussle.errors import MissingExtraError, ViewError
+from tussle.errors import MissingExtraError
 from tussle.mission import Mission
 from tussle.view.live import Live
 from tussle.view.page.access import HEADERS, MOST_BROWSERS, MOST_BYTES, MOST_UNSENT, Access, bound_socket
@@ -22,6 +20,7 @@ from tussle.view.page.document import game_document, scenery_blobs
 from tussle.view.page.failures import Failures
 from tussle.view.page.publisher import FramePublisher
 from tussle.view.page.recorded import RecordedData
+from tussle.view.page.web_server import WebServer
 from tussle.view.recording import Recording
 
 if TYPE_CHECKING:
@@ -102,43 +101,15 @@ class Page:
         self.is_local = ipaddress.ip_address(address).is_loopback
         self._access = Access(self.host, self.port)
         self.url = self._access.url
-        self._bound = bound
-        is_up = threading.Event()
-        self._thread = threading.Thread(target=lambda: self._run(is_up), name="tussle page", daemon=True)
-        self._thread.start()
-        is_up.wait()
+        publisher = self.publisher
+        self._server: WebServer | None = None
+        with self._failures.caught():
+            self._server = WebServer(
+                bound, self._admit, "tussle page", beside=[publisher.run] if publisher else [], headers=HEADERS,
+                tell=self._failures.tell,
+            )  # fmt: skip
 
     # -- the server -----------------------------------------------------------------------------------------------------------------
-
-    def _run(self, is_up: threading.Event) -> None:
-        """Body of the server thread; reports when the server is ready or has failed."""
-        with self._failures.caught():
-            asyncio.run(self._serve(is_up))
-        is_up.set()
-
-    async def _serve(self, is_up: threading.Event) -> None:
-        """Serve until `stop`."""
-        from aiohttp import web
-
-        self._loop, self._stopping = asyncio.get_running_loop(), asyncio.Event()
-        self._loop.set_exception_handler(
-            lambda _, context: self._failures.tell(context.get("exception") or ViewError(context["message"]))
-        )
-        app = web.Application()
-        app.router.add_get("/{tail:.*}", self._admit)
-        app.on_response_prepare.append(_set_headers)
-        log = logging.getLogger(__name__)  # silent: a traceback for each port scan is no news
-        log.addHandler(logging.NullHandler())
-        log.propagate = False
-        runner = web.AppRunner(app, access_log=None, logger=log, handle_signals=False, shutdown_timeout=0.1)
-        await runner.setup()
-        await web.SockSite(runner, self._bound).start()
-        tasks = [asyncio.create_task(self.publisher.run())] if self.publisher else []
-        is_up.set()
-        await self._stopping.wait()
-        for task in tasks:
-            task.cancel()
-        await runner.cleanup()
 
     async def _admit(self, request: web.Request) -> web.StreamResponse:
         """Answer a request, or refuse it."""
@@ -208,20 +179,14 @@ class Page:
 
     def stop(self) -> None:
         """Stop serving. A second call does nothing."""
-        if self._thread.is_alive():
-            self._loop.call_soon_threadsafe(self._stopping.set)
-            self._thread.join(10.0)
+        if self._server is not None:
+            self._server.stop()
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:
         self.stop()
-
-
-async def _set_headers(_: web.Request, response: web.StreamResponse) -> None:
-    response.headers.update(HEADERS)
-    response.headers.popall("Server", None)
 
 
 def _check_extra() -> None:

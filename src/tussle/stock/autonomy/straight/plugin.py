@@ -53,6 +53,10 @@ class Straight(Autonomy):
     desired_speed = Output(unit="m/s")
     desired_heading = Output(unit="rad")
 
+    def named_blocks(self) -> tuple[str, ...]:
+        """Return the block of the new entities, with `generate_entities`."""
+        return (self.values["template"],) if self.values["generate_entities"] else ()
+
     def spawn(self, g: GroupView, rows: np.ndarray) -> None:
         self.goal[:, rows] = g.pos[:, rows] + AHEAD * g.column("forward", rows)
         self.goal[2, rows] = g.pos[2, rows]

@@ -51,6 +51,11 @@ class TrajectoryRecordPlayback(Autonomy):
                 "below the current directory"
             )
 
+    def spawn(self, g: GroupView, rows: np.ndarray) -> None:
+        """Read the file, so that its errors show before the first step."""
+        if self.enable_playback:
+            read_recorded(self.trajectory_filename)
+
     def step(self, g: GroupView) -> None:
         if not self.enable_playback:
             return

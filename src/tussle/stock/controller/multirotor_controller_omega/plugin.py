@@ -29,6 +29,10 @@ class MultirotorControllerOmega(Controller):
         vars()[f"omega_{_i}"] = Input(unit="rad/s", optional=_i > 0, doc=f"Speed of rotor {_i}.")
     motors = Output(" ".join(f"motor_{i}" for i in ROTORS), unit="rad/s", doc="Speeds of the rotors.")
 
+    def check_values(self) -> None:
+        """Check the range of pulse widths."""
+        self.check_range("pwm_min", "pwm_max")
+
     def active_inputs(self) -> list[str]:
         """Return the pulse widths or the speeds."""
         return [f"{self.command}_{i}" for i in ROTORS]

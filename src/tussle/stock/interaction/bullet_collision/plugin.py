@@ -7,7 +7,7 @@ import numpy as np
 from tussle.api import HistoricAttributes, Interaction, Param, State, WorldView, neighbors
 from tussle.contacts import found
 from tussle.contacts.solids import StaticSolids
-from tussle.errors import ParameterError, listed, nearest_name
+from tussle.errors import ParameterError
 from tussle.messages import EntityCollided, EntityHitGround
 from tussle.numeric.quaternion import quat_multiply, quat_normalize
 
@@ -85,9 +85,12 @@ class BulletCollision(Interaction):
             return None
         return other_id
 
+    def named_blocks(self) -> tuple[str, ...]:
+        """Return the blocks of `capsules` and `fixed`."""
+        return tuple(name for param in ("capsules", "fixed") for name in _names(self.values[param]))
+
     def start(self, w: WorldView) -> None:
-        self._shapes(w)  # reports unknown names of blocks before the first step
-        self._blocks(w, "fixed")
+        self._shapes(w)  # reports blocks without a box before the first step
 
     def step(self, w: WorldView) -> None:
         if not self.enable_collision_detection or not w.n:
@@ -137,14 +140,7 @@ class BulletCollision(Interaction):
 
     def _blocks(self, w: WorldView, param: str) -> list[int]:
         """Numbers of the blocks that a parameter names."""
-        known, numbers = w.context.block_names, []
-        for name in (part.strip() for part in getattr(self, param).split(",")):
-            if name and name not in known:
-                raise ParameterError(
-                    f"BulletCollision.{param}: there is no block {name!r}{nearest_name(name, known)}; {listed(known)}"
-                )
-            numbers += [known.index(name)] if name else []
-        return numbers
+        return [w.context.block_names.index(name) for name in _names(getattr(self, param))]
 
     def _scene(self, w: WorldView) -> StaticSolids:
         solids = w.scene.static_solids if self.enable_terrain else w.scene.static_walls
@@ -219,3 +215,7 @@ class BulletCollision(Interaction):
                 pos=w.pos[:, at] + contacts.numbers[touches, 3:6].T, direction=normal * w.radius[at],
                 world=w.world[at], colour=(255, 0, 0),
             )  # fmt: skip
+
+
+def _names(text: str) -> list[str]:
+    return [part.strip() for part in text.split(",") if part.strip()]

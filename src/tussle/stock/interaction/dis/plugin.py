@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 
 from tussle.api import Interaction, Param, State, WorldView
-from tussle.errors import MissionError, ParameterError, listed, nearest_name
+from tussle.errors import ParameterError
 from tussle.numeric.quaternion import quat_rotate_inverse
 from tussle.stock.interaction.dis import pdu
 from tussle.stock.interaction.dis.link import ExerciseLink, Remote
@@ -84,16 +84,15 @@ class DIS(Interaction):
                         f"DIS.types: {field} = {value:g} of team {row[0]:g} is not allowed; it takes a whole number from 0 to {most}"
                     )
 
+    def named_blocks(self) -> tuple[str, ...]:
+        """Return the block of the remote entities, if there is one."""
+        return (self.values["remote"],) if self.values["remote"] else ()
+
     def start(self, w: WorldView) -> None:
         """Open the socket."""
         if self.listen_port and not self.remote:
             raise ParameterError(
                 f"{self.instance_name}: listen_port = {self.listen_port} needs remote, the block of the entities that come"
-            )
-        if self.remote and self.remote not in w.templates:
-            raise MissionError(
-                f"{self.instance_name}.remote = {self.remote!r} names no block{nearest_name(self.remote, w.templates)}; "
-                f"{listed(w.templates)}"
             )
         self._link(w)
 

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import io
 import math
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from tussle.api import HistoricAttributes, Interaction, Param, State, WorldView
+from tussle.documents import read_bytes
 from tussle.errors import ParameterError
 from tussle.geodesy import Origin
 from tussle.messages import RoadGraph
@@ -36,6 +39,10 @@ class GraphInteraction(Interaction):
     draw_node_labels = Param(True, structural=True, doc="Draw the names of the nodes.")
     is_told = State(dtype=bool, per="world", doc="Whether the graph has been published.")
 
+    def start(self, w: WorldView) -> None:
+        """Read the file, so that its errors show before the first step."""
+        _read(self.graph_file, w.scene.origin)
+
     def step(self, w: WorldView) -> None:
         fresh = np.flatnonzero(~self.is_told & (np.bincount(w.world, minlength=w.n_worlds) > 0))
         if len(fresh):
@@ -63,8 +70,8 @@ def _read(path: str, origin: Origin) -> Any:
             "GraphInteraction needs networkx, which is not installed: pip install 'tussle[maps]'"
         ) from None
     try:
-        graph = nx.read_graphml(path)
-    except (OSError, SyntaxError, KeyError, ValueError, nx.NetworkXError) as error:
+        graph = nx.read_graphml(io.BytesIO(read_bytes(Path(path), ParameterError)))
+    except (ParameterError, SyntaxError, KeyError, ValueError, nx.NetworkXError) as error:
         raise ParameterError(
             f"GraphInteraction.graph_file = {path!r} cannot be read ({error}); it takes the path of a GraphML file"
         ) from error

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import numpy as np
 
 from tussle.api import Interaction, Param
+from tussle.documents import read_bytes
 from tussle.errors import ParameterError
 from tussle.scene import Cuboid, Volume
 from tussle.stock.interaction.map_gen_2d.map_file import read_map_file
 
 MOST_WALLS = 20_000
+FORMATS = ("PNG", "JPEG", "TIFF", "BMP", "GIF", "PPM")
+"""Formats of images. Others, such as PostScript, are read by programs that Pillow starts."""
 
 
 class MapGen2D(Interaction):
@@ -86,17 +90,21 @@ class MapGen2D(Interaction):
     def _brightness(self) -> np.ndarray:
         """Brightness of the pixels, 0 to 255, (rows, columns), from north to south."""
         try:
-            from PIL import Image
+            from PIL import Image, UnidentifiedImageError
         except ImportError:
             raise ParameterError(
                 "MapGen2D needs Pillow, which is not installed: pip install 'tussle[maps]'"
             ) from None
         try:
-            with Image.open(self.map) as image:
+            data = read_bytes(Path(self.map), ParameterError)
+            with Image.open(io.BytesIO(data), formats=FORMATS) as image:
                 return np.asarray(image.convert("L"))
-        except (OSError, ValueError, Image.DecompressionBombError) as error:
+        except Exception as error:  # decoders of damaged data raise errors of many kinds
+            reason = (
+                f"it is no {', '.join(FORMATS)} file" if isinstance(error, UnidentifiedImageError) else error
+            )
             raise ParameterError(
-                f"MapGen2D.map = {self.map!r} cannot be read ({error}); it takes the path of an image"
+                f"MapGen2D.map = {self.map!r} cannot be read ({reason!s:.300}); it takes the path of an image"
             ) from error
 
 

@@ -110,6 +110,10 @@ class FixedWing6DOF(RigidBodyModel):
     aileron = Input(doc="Aileron [rad], right wing down positive.")
     rudder = Input(doc="Rudder [rad].")
 
+    def check_values(self) -> None:
+        """Check the range of the throttle."""
+        self.check_range("throttle_input_min", "throttle_input_max")
+
     @staticmethod
     def derivative(
         rigid_body: Any,
