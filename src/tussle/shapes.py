@@ -295,6 +295,12 @@ class Sphere(Volume):
         way: np.ndarray = np.array(self.center)[:, None] - pos
         return way
 
+    def touches(self, center: np.ndarray, radius: np.ndarray) -> np.ndarray:
+        """Return True if spheres with centres outside [m], (3, n), and radii [m], (n,), reach the inside, (n,)."""
+        x, y, z = self.inward(center)
+        reached: np.ndarray = np.sqrt(x * x + y * y + z * z) < self.radius + radius
+        return reached
+
     def ray(self, origin: np.ndarray, direction: np.ndarray) -> np.ndarray:
         direction = _unit(direction)
         x, y, z = (c - p for p, c in zip(origin, self.center, strict=True))
