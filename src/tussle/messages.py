@@ -325,11 +325,12 @@ class WaypointList(Message):
 
 
 class WaypointStatus(Message):
-    """A waypoint was reached."""
+    """A waypoint was reached, or skipped."""
 
     index = Field(dtype=int, doc="Index of the next waypoint.")
     n_waypoints = Field(dtype=int, doc="Length of the list.")
     is_done = Field(dtype=bool, doc="Whether the end of the list was reached.")
+    is_skipped = Field(dtype=bool, doc="Whether the waypoint was skipped, since it could not be reached.")
 
 
 class GPSStatus(Message):

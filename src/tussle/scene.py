@@ -254,6 +254,19 @@ class Scene:
         """
         return ~self.caster.touches(points, radius)
 
+    def free_between(self, a: Any, b: Any, radius: Any) -> np.ndarray:
+        """Return True if spheres that move straight from points a to b [m], (3, n) each, stay `free` all the way, (n,).
+
+        A touch less deep than 0.1 mm, or than 0.5 % of the radius [m], one or (n,), may not be found.
+
+        Raises:
+            ParameterError: A shape does not fit, or a value is not allowed.
+        """
+        start, end = checked_vectors("a", a), checked_vectors("b", b)
+        if start.shape != end.shape:
+            raise ParameterError(f"a has shape {start.shape} and b {end.shape}; they must be equal")
+        return ~self.caster.touches_between(start, end, radius)
+
     def line_of_sight(self, a: Any, b: Any) -> np.ndarray:
         """Return True if nothing of the scene lies between points a and b [m], (3, n) each; (n,).
 

@@ -57,6 +57,18 @@ class Volume(ABC):
         """Outward unit normals at points of the surface [m], (3, n)."""
         return -_unit(self.inward(pos))
 
+    def crossed(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+        """Return True if a point of the straight way from a to b [m], (3, n) each, lies inside, (n,)."""
+        found: np.ndarray = self.contains(a) | self.contains(b)
+        rest = np.flatnonzero(~found & (a != b).any(axis=0))
+        if len(rest):
+            with np.errstate(over="ignore", invalid="ignore"):
+                x, y, z = way = b[:, rest] - a[:, rest]
+                # Between the first surface from a and that from b; a way that only ends at the surface has no length there.
+                outside = self.ray(a[:, rest], way) + self.ray(b[:, rest], -way)
+                found[rest] = outside < (1.0 - 1e-9) * np.sqrt(x * x + y * y + z * z)
+        return found
+
     def touches(self, center: np.ndarray, radius: np.ndarray) -> np.ndarray:
         """Return True if spheres with centres outside [m], (3, n), and radii [m], (n,), reach the inside, (n,)."""
         return self.contains(center + radius * _unit(self.inward(center)))
@@ -294,6 +306,12 @@ class Sphere(Volume):
         """Towards the centre."""
         way: np.ndarray = np.array(self.center)[:, None] - pos
         return way
+
+    def touches(self, center: np.ndarray, radius: np.ndarray) -> np.ndarray:
+        """Return True if spheres with centres outside [m], (3, n), and radii [m], (n,), reach the inside, (n,)."""
+        x, y, z = self.inward(center)
+        reached: np.ndarray = np.sqrt(x * x + y * y + z * z) < self.radius + radius
+        return reached
 
     def ray(self, origin: np.ndarray, direction: np.ndarray) -> np.ndarray:
         direction = _unit(direction)

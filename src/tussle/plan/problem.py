@@ -128,14 +128,18 @@ class Problem:
         u = self.whole(commands)
         return self.motion.rollout(x, np.broadcast_to(u, (n_steps, *u.shape)), self.dt, self.substeps)
 
-    def is_allowed(self, x: np.ndarray) -> np.ndarray:
-        """Return True if states (m, n) are finite, within the bounds and free of obstacles, (n,)."""
+    def is_allowed(self, x: np.ndarray, before: np.ndarray | None = None) -> np.ndarray:
+        """Return True if states (m, n) are finite, within the bounds and free of obstacles, (n,).
+
+        With the states one step before, (m, n), the straight way from there must be free too.
+        """
         rows, low, high = self.bounded
         inside = (x[rows] >= low[:, None]) & (x[rows] <= high[:, None])
         allowed: np.ndarray = inside.all(axis=0) & np.isfinite(x).all(axis=0)
         if self.scene.solids:
             some = np.flatnonzero(allowed)
-            allowed[some] = self.scene.free(x[self.position][:, some], self.radius)
+            a, b = (state[self.position][:, some] for state in (x if before is None else before, x))
+            allowed[some] = self.scene.free_between(a, b, self.radius)
         return allowed
 
     def distance(self, x: np.ndarray) -> np.ndarray:

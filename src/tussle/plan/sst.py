@@ -175,10 +175,10 @@ def _grow(problem: Problem, tree: Tree, parents: np.ndarray, chance: np.random.G
     for k in range(1, int(drawn[0]) + 1):
         m = int(np.count_nonzero(drawn >= k))
         path = problem.propagate(np.ascontiguousarray(x[:, :m]), commands[:, :m], 1)
-        x = path[1]
+        before, x = path
         moves = ~is_there[:m]  # a branch ends where it reaches the goal
         end[:, :m] = np.where(moves, x, end[:, :m])
-        allowed[:m] &= ~moves | problem.is_allowed(x)
+        allowed[:m] &= ~moves | problem.is_allowed(x, before)
         arrived = moves & allowed[:m] & (problem.distance(x) <= problem.goal_radius)
         steps[:m][arrived] = k
         is_there[:m] |= arrived

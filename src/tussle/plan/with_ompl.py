@@ -117,11 +117,13 @@ class _Calls:
         return np.array([[state[k]] for k in range(len(self.problem.fields))])
 
     def propagate(self, state: Any, command: Any, duration: float, result: Any) -> None:
-        """Write the state after `duration` [s] to `result`."""
+        """Write the state after `duration` [s] to `result`; NaN, which is not valid, if the way there is blocked."""
         commands = np.array([[command[k]] for k in range(len(self.problem.commands))])
         steps = max(1, round(duration / self.problem.dt))
         self.n_steps += steps
-        end = self.problem.propagate(self.values(state), commands, steps)[-1, :, 0]
+        path = self.problem.propagate(self.values(state), commands, steps)[:, :, 0].T
+        is_free = self.problem.is_allowed(path[:, 1:], path[:, :-1]).all()
+        end = path[:, -1] if is_free else np.full(len(path), np.nan)
         for k, value in enumerate(end.tolist()):
             result[k] = value
 

@@ -12,6 +12,13 @@ from tussle.rays.hits import FARTHEST_RAY, Hits, checked_numbers, checked_vector
 from tussle.rays.surfaces import HeightField, TriangleMesh
 from tussle.shapes import FlatGround, Polyhedron, Sphere, Volume
 
+PIECE, SHORTEST_PIECE = 0.1, 1e-4
+"""Half length of the pieces of a path that are not divided further: the larger of two lengths, in radii of the sphere and in metres.
+
+Of what a sphere of radius r sweeps, spheres whose centres are 2 h apart leave out less than a depth of h^2 / (2 r).
+"""
+PARTS = (np.arange(8) - 3.5) / 4.0
+"""Middles of the pieces into which a piece is divided, in half lengths of it. Halves would take three times as many passes."""
 KINDS = ("nothing", "ground", "wall", "mesh", "entity")
 """Kinds of solids that rays hit, by number; hills are "ground", buildings "wall"."""
 Split = Callable[[int, Callable[[int, int], Any]], Any]
@@ -150,6 +157,46 @@ class Solids:
                 touching.touch_field(part.height, part.grid, center, reach, touches)
             elif isinstance(part, Volume):
                 touches |= part.contains(center) | part.touches(center, reach)
+        return touches
+
+    def touches_between(self, start: np.ndarray, end: np.ndarray, radius: object) -> np.ndarray:
+        """Return whether spheres that move straight from `start` to `end` [m], (3, n), touch a part or lie inside one, (n,).
+
+        A piece of a path is clear if the ball that encloses it is; otherwise it is divided. A path beyond the reach of rays is not clear.
+        """
+        size = np.minimum(checked_numbers("radius", radius, start.shape[1]), FARTHEST_RAY)
+        with np.errstate(over="ignore"):
+            x, y, z = way = 0.5 * (end - start)
+            half = np.sqrt(x * x + y * y + z * z)
+            center = 0.5 * (start + end)
+        is_sane = half <= FARTHEST_RAY
+        touches: np.ndarray = ~is_sane
+        path = np.flatnonzero(is_sane)
+        is_near = self.touches(center[:, path], size[path] + half[path])
+        if any(
+            isinstance(part, HeightField) for part in self.parts
+        ):  # its lower side is inside, and may be far from the surface
+            is_near |= self.touches(start[:, path], size[path]) | self.touches(end[:, path], size[path])
+        path = path[is_near]
+        ends = np.concatenate([start[:, path], end[:, path]], axis=1)
+        touches[path] = self.touches(ends, np.tile(size[path], 2)).reshape(2, -1).any(axis=0)
+        # A sphere smaller than the pieces may pass through a surface between two points.
+        rays = new_rays(start[:, path], way[:, path], 2.0 * half[path])
+        self.first_hits(*rays)
+        touches[path] |= rays[3] < np.inf
+        path, part = path[~touches[path]], 1.0
+        place = np.zeros(
+            len(path)
+        )  # of the middle of a piece, from the middle of the path, in its half lengths
+        while len(path):
+            is_long = part * half[path] > np.maximum(PIECE * size[path], SHORTEST_PIECE)
+            reach = size[path] + np.where(is_long, part * half[path], 0.0)
+            meets = self.touches(center[:, path] + place * way[:, path], reach)
+            touches[path[meets & ~is_long]] = True
+            divided = np.flatnonzero(meets & is_long)
+            path, place = path[divided], place[divided]
+            place = (place[:, None] + part * PARTS).ravel()
+            path, part = np.repeat(path, len(PARTS)), part / len(PARTS)
         return touches
 
 

@@ -10,6 +10,7 @@ from tussle.api import Autonomy, Output
 from tussle.errors import ParameterError
 from tussle.plan import Problem, solve, solve_with_ompl
 from tussle.plan.sst import Tree, _grow
+from tussle.plan.with_ompl import _Calls
 from tussle.scene import Cuboid, Scene
 from tussle.stock import Multirotor, Unicycle
 
@@ -35,10 +36,14 @@ def problem(**changes):
 
 
 def check(plan):
-    """The path begins at the start, is allowed in every step, and ends in the goal; its commands are within their ranges."""
+    """The path begins at the start, is allowed in every step and between steps, and ends in the goal, by commands within their ranges."""
     asked = plan.problem
     np.testing.assert_array_equal(plan.path[0], asked.first)
-    assert asked.is_allowed(np.ascontiguousarray(plan.path.T)).all()
+    states = np.ascontiguousarray(plan.path.T)
+    assert asked.is_allowed(states[:, 1:], states[:, :-1]).all()
+    ways = zip(states[:, :-1].T, states[:, 1:].T, strict=True)
+    points = np.concatenate([np.linspace(a, b, 101) for a, b in ways]).T
+    assert asked.scene.free(points[asked.position], 0.99 * asked.radius).all()
     assert asked.distance(plan.path[-1]) <= asked.goal_radius
     low, high = np.array(list(asked.commands.values())).T
     assert ((plan.commands >= low) & (plan.commands <= high)).all()
@@ -121,6 +126,33 @@ def test_a_goal_that_cannot_be_reached_gives_the_way_to_the_nearest_node():
     assert not plan.is_solved
     gaps = plan.problem.distance(np.vstack([plan.nodes, np.zeros((2, plan.nodes.shape[1]))]))
     assert plan.problem.distance(plan.path[-1]) == pytest.approx(gaps.min())
+
+
+@pytest.mark.parametrize(
+    ("thickness", "gap", "dt"), [(0.05, 0.0, 0.5), (1.0, 0.0, 0.2), (1.0, 0.0, 0.5), (0.2, 0.3, 0.5)]
+)
+def test_no_plan_leads_through_a_closed_wall_or_a_gap_that_is_too_narrow(thickness, gap, dt):
+    walls = [
+        Cuboid(center=(50, side * (70 + gap / 2) + 50, 0), lengths=(thickness, 140, 20)) for side in (-1, 1)
+    ]
+    asked = problem(
+        scene=Scene(walls=walls), radius=0.2, dt=dt, motion=Unicycle(vel_max=10.0, turn_rate_max=1.0, use_pitch=False),
+        commands={"speed": (2.0, 10.0), "turn_rate": (-1.0, 1.0)},
+    )  # fmt: skip
+    plan = solve(asked, seed=1, branches=20_000, stop_at_first=True)
+    assert not plan.is_solved
+    assert 45.0 < plan.nodes[0].max() < 50.0  # the tree has reached the wall, not the other side
+
+
+def test_planners_of_ompl_do_not_jump_over_a_wall():
+    thin = Scene(walls=[Cuboid(center=(50, 50, 0), lengths=(0.05, 140, 20))])
+    calls = _Calls(problem(scene=thin, radius=0.0, dt=0.5))
+    before, after = [48.9, 10.0, 0.0, 0.0, 0.0], [0.0] * 5
+    calls.propagate(before, [5.0, 0.0], 0.5, after)
+    assert not calls.is_valid(after)
+    calls.propagate(before, [2.0, 0.0], 0.5, after)
+    assert after[0] == pytest.approx(49.9)
+    assert calls.is_valid(after)
 
 
 @pytest.mark.parametrize("planner", ["RRT", "KPIECE1", "EST"])

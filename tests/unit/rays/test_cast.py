@@ -144,6 +144,8 @@ def test_height_free_and_line_of_sight():
     radius = [0.4, 0.1, 0.1, 1.1, 0.9, 1.4, 1.0]
     assert scene.free(points, radius).tolist() == [True, False, False, False, True, True, True]
     assert not scene.free(points, np.inf).any()
+    ball = Scene(walls=[Sphere((0.0, 0.0, 0.0), 0.5)])  # smaller than those that touch it
+    assert ball.free(np.array([[0.6, 2.4, 2.6], [0, 0, 0], [0, 0, 0]]), 2.0).tolist() == [False, False, True]
     rng = np.random.default_rng(2)
     mesh = soup(rng, 60)
     at = rng.uniform(-20, 20, (3, 80))
@@ -328,6 +330,8 @@ def looking(rows=None, world=None):
         (lambda s: s.cast(np.zeros((3, 1)), np.zeros((3, 1)), -1.0), "max_range has the value .*-1.0"),
         (lambda s: s.cast(np.zeros((3, 1)), np.zeros((3, 1)), [1.0, 2.0]), r"max_range has shape \(2,\)"),
         (lambda s: s.free(np.zeros((3, 1)), np.nan), "radius has the value .*nan"),
+        (lambda s: s.free_between(np.zeros((3, 1)), np.zeros((3, 2)), 1.0), "must be equal"),
+        (lambda s: s.free_between(np.zeros((3, 1)), np.ones((3, 1)), -1.0), "radius has the value"),
         (
             lambda s: s.line_of_sight(np.zeros((3, 1)), np.zeros((3, 2))),
             r"a has shape \(3, 1\) and b \(3, 2\)",

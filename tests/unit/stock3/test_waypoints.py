@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from small_worlds import Drift, block, mission
 
-from tussle import Simulation
-from tussle.api import Autonomy, Publish, RaggedColumn, State, Subscribe
+from tussle import Simulation, historic, stock
+from tussle.api import Autonomy, Output, Publish, RaggedColumn, State, Subscribe
 from tussle.messages import WAYPOINT_MODES, Waypoint, WaypointList, WaypointStatus
 from tussle.stock import (
     MotorSchemas,
@@ -36,6 +36,7 @@ class Ear(Autonomy):
     n_told = State(dtype=int)
     index = State(dtype=int, default=-1)
     is_done = State(dtype=bool)
+    is_skipped = State(dtype=bool)
     lists = Subscribe(WaypointList)
     goals = Subscribe(Waypoint, network="LocalNetwork")
     reached = Subscribe(WaypointStatus, network="LocalNetwork")
@@ -54,6 +55,7 @@ class Ear(Autonomy):
         np.add.at(self.n_told, rows, 1)
         for number, row in enumerate(rows):
             self.index[row], self.is_done[row] = heard.index[number], heard.is_done[number]
+            self.is_skipped[row] = heard.is_skipped[number]
 
 
 # -- WaypointGenerator ------------------------------------------------------------------------------------------------------------
@@ -239,6 +241,87 @@ def test_entities_are_led_each_along_its_own_list_and_without_one_not_at_all():
     assert target[0][0][1:] == pytest.approx([100.0, 0.0], abs=15.0)
     assert target[1][1][1:] == pytest.approx([200.0, 0.0], abs=15.0)
     assert target[2] == [[0.0, -500.0, 0.0]] * 2
+
+
+def passed(laws, points, speed, *, tolerance=0.3, steps=40, mode="follow_once"):
+    """Number of the next waypoint after each step, flying East at a constant speed from (0, 0, 0)."""
+    listed = [point(x, y, tolerance=tolerance) for x, y in points]
+    blocks = [
+        block("led", autonomy=[laws.WaypointDispatcher(filter_dist=0.0), Drift(to=(speed, 0.0, 0.0))], motion=SingleIntegrator()),
+        block("tower", autonomy=WaypointGenerator(waypoints=listed, mode=mode), motion=Still()),
+    ]  # fmt: skip
+    sim, seen = Simulation(mission(*blocks, end=60.0), seeds=[1, 2]), []
+    for _ in range(steps):
+        sim.step()
+        seen.append(sim.read("led.WaypointDispatcher.current")[0][:, 0].tolist())
+    assert all(a == b for a, b in seen)
+    return [a for a, _ in seen]
+
+
+def test_a_waypoint_between_two_steps_is_reached_by_its_nearest_distance_to_the_way():
+    ahead = (100.0, 0.0)
+    assert passed(stock, [(5.25, 0.0), ahead], 15.0)[-1] == 1
+    assert passed(stock, [(5.25, 0.29), ahead], 15.0)[-1] == 1
+    assert passed(stock, [(5.25, 0.31), ahead], 15.0)[-1] == 0
+    assert passed(historic, [(5.25, 0.0), ahead], 15.0)[-1] == 0
+
+
+def test_all_waypoints_that_a_step_passes_are_reached_in_order():
+    row = [(1.0 * x, 0.0) for x in range(10, 30)]
+    assert passed(stock, row, 40.0)[-1] == 19
+    assert passed(historic, row, 40.0)[-1] < 5
+    # Against the order: the second one lies behind the first.
+    assert passed(stock, [(12.5, 0.0), (11.5, 0.0), (90.0, 0.0)], 40.0)[-1] == 1
+    assert passed(stock, [(10.5, 0.0), (11.5, 0.0)], 40.0, mode="racetrack")[-1] == 0
+
+
+def test_what_was_passed_before_the_list_came_is_not_reached():
+    blocks = [
+        block("led", autonomy=[WaypointDispatcher(), Drift(to=(40.0, 0.0, 0.0))], motion=SingleIntegrator()),
+        block("tower", autonomy=WaypointGenerator(waypoints=[point(38.0, time=0.9, tolerance=0.5)]), motion=Still()),
+    ]  # fmt: skip
+    sim = Simulation(mission(*blocks, end=60.0))
+    sim.step(20)
+    assert sim.read("led.WaypointDispatcher.points")[0][0][0].shape[1] == 1
+    assert not sim.read("led.WaypointDispatcher.is_done")[0].any()
+
+
+class Circle(Autonomy):
+    """Flies round a place."""
+
+    command = Output("velocity_x velocity_y velocity_z", unit="m/s")
+
+    def step(self, g):
+        x, y = g.pos[:2]
+        self.command[:] = np.stack([-y, x, 0.0 * x])
+
+
+def circling(laws, **values):
+    """A dispatcher that circles its first waypoint at 20 m, 1 rad/s."""
+    ring = block(
+        "led",
+        position=(20.0, 0.0, 0.0),
+        autonomy=[laws.WaypointDispatcher(**values), Ear(), Circle()],
+        motion=SingleIntegrator(),
+    )
+    tower = block("tower", autonomy=WaypointGenerator(waypoints=[point(0.0), point(300.0)]), motion=Still())
+    return Simulation(mission(ring, tower, end=60.0))
+
+
+def test_a_waypoint_that_is_circled_is_skipped_after_a_turn_and_a_warning_says_so():
+    sim = circling(stock)
+    sim.step(60)
+    assert led(sim, "n_told") == 0
+    with pytest.warns(
+        RuntimeWarning, match="WaypointDispatcher: an entity skips a waypoint that it has circled"
+    ):
+        sim.step(10)
+    assert (led(sim, "n_told"), led(sim, "index")) == (1, 1)
+    assert led(sim, "is_skipped") is True
+    for laws, values in ((stock, {"max_turns": 0.0}), (historic, {})):
+        sim = circling(laws, **values)
+        sim.step(200)
+        assert led(sim, "n_told") == 0
 
 
 class Silent(Autonomy):

@@ -145,6 +145,27 @@ def test_a_waypoint_that_is_passed_within_a_step_is_reached_and_the_last_one_is_
     assert path[-1] == 230.0
 
 
+def test_points_nearer_to_each_other_than_a_step_are_all_passed():
+    row = tuple((10.0 * x, 0.0, 50.0) for x in range(1, 30))
+    line = traveller("a", (), SingleIntegrator(), waypoints=row, tolerance=1.0, speed=70.0)
+    sim = Simulation(Mission(blocks=[line], dt=1.0, end=20.0))
+    sim.step(5)
+    assert sim.read("a.pos")[0][0, 0, 0] == pytest.approx(280.0, abs=11.0)
+    sim.run()
+    assert sim.read("a.pos")[0][0, 0] == pytest.approx([290.0, 0.0, 50.0])
+
+
+def test_a_waypoint_inside_the_turning_circle_is_skipped_after_a_turn():
+    controller, motion = SimpleAircraftControllerPID(), SimpleAircraft(turning_radius=40.0, max_velocity=25.0)
+    near = {"waypoints": ((0.0, 45.0, 50.0), (500.0, 500.0, 50.0)), "speed": 25.0}
+    keeps = traveller("keeps", controller, motion, **near, max_turns=0.0)
+    sim = Simulation(Mission(blocks=[traveller("a", controller, motion, **near), keeps], dt=0.1, end=120.0))
+    with pytest.warns(RuntimeWarning, match="GoTo: an entity skips a waypoint that it has circled"):
+        sim.run()
+    assert sim.read("a.GoTo.current")[0][0, 0] == 1
+    assert sim.read("keeps.GoTo.current")[0][0, 0] == 0
+
+
 def test_a_vehicle_whose_channels_fit_none_of_the_three_forms_is_refused():
     with pytest.raises(WiringError, match=r"controllers that connect them: .*UnicyclePID"):
         Simulation(Mission(blocks=[traveller("a", (), Unicycle())]))

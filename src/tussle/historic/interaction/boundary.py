@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from tussle.api import WorldView
 from tussle.scene import Cuboid, Volume
 from tussle.stock.interaction import boundary
@@ -10,7 +12,8 @@ from tussle.stock.interaction import boundary
 class Boundary(boundary.Boundary):
     """Boundary that ignores the rotation of a cuboid, and publishes its shape in the first step only, even if no entity is there.
 
-    Entities that are born later never receive it; in tussle it waits for the first entity. Planes and polyhedra are those of tussle:
+    Entities that are born later never receive it; in tussle it waits for the first entity. An entity that goes through
+    the region in one step does not enter it. Planes and polyhedra are those of tussle:
     in SCRIMMAGE a plane has sides, and a polyhedron ends the run.
     """
 
@@ -23,3 +26,6 @@ class Boundary(boundary.Boundary):
     def step(self, w: WorldView) -> None:
         self.is_told[:] |= w.step_count > 0
         super().step(w)
+
+    def _is_through(self, w: WorldView, may: np.ndarray) -> np.ndarray:
+        return np.zeros(w.n, bool)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from tussle.api import WorldView
+from tussle.scene import Volume
 from tussle.stock.interaction import capture_in_boundary_interaction
 
 
@@ -14,7 +15,8 @@ class CaptureInBoundaryInteraction(capture_in_boundary_interaction.CaptureInBoun
     Both must be inside the boundary after it. The boundary is known from the end of the first step on.
     """
 
-    reads_start_positions = True
+    def _is_inside(self, w: WorldView, shape: Volume) -> np.ndarray:
+        return shape.contains(w.pos)
 
     def _near(self, w: WorldView, reach: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         reach = np.where(w.step_count[w.world] > 0, reach, 0.0)

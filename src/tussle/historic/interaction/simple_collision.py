@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from tussle.api import WorldView
-from tussle.api.laws import Listed
 from tussle.stock.interaction import simple_collision
 
 
@@ -13,16 +12,19 @@ class SimpleCollision(simple_collision.SimpleCollision):
     """SimpleCollision that takes pairs in the order of ids, and ignores pairs with an entity just removed.
 
     So of three that collide, the first pair is removed and the third flies on. Entities that an earlier interaction has removed in the
-    step do not collide. In tussle all pairs collide. With `init_alt_deconflict`, positions at the range itself are rejected too.
+    step do not collide. Distances are those at the end of the step. In tussle all pairs collide, also between
+    two steps. With `init_alt_deconflict`, positions at the range itself are rejected too.
     """
 
-    def _colliding(self, w: WorldView, met: Listed) -> np.ndarray:
+    def _begin(self, w: WorldView) -> np.ndarray:
+        return np.asarray(w.pos)
+
+    def _colliding(self, w: WorldView, first: np.ndarray, second: np.ndarray) -> np.ndarray:
         is_gone = np.zeros(w.n, bool)
         for rows, _ in w.deaths:
             is_gone[rows] = True
-        order = np.lexsort((met.second, met.first, w.world[met.row]))
         kept = []
-        for number, row, other in zip(order, met.row[order], met.other[order], strict=True):
+        for number, (row, other) in enumerate(zip(first, second, strict=True)):
             if not (is_gone[row] or is_gone[other]):
                 is_gone[[row, other]] = True
                 kept.append(number)

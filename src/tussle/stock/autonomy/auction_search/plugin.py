@@ -6,6 +6,7 @@ import numpy as np
 
 from tussle.api import Autonomy, EntityRef, Field, GroupView, Message, Param, Publish, State, Subscribe
 from tussle.messages import TextMessage, Waypoint
+from tussle.numeric.ways import closest_approach
 
 NO_BID = 1e300
 
@@ -93,7 +94,11 @@ class AuctionSearch(Autonomy):
     def _visit(self, g: GroupView, had_route: np.ndarray) -> None:
         """Publish the first area of each route, after removal of areas that the entity has reached."""
         rows = np.flatnonzero(self.route.count)
-        there = length(self.route.data[:, self.route.start[rows]] - g.pos[:, rows]) <= self.tolerance[rows]
+        way = (
+            g.vel[:, rows] * g.dt
+        )  # that of the last step: an area is visited when it comes within the tolerance
+        offset = g.pos[:, rows] - way - self.route.data[:, self.route.start[rows]]
+        there = closest_approach(offset, way)[1] <= self.tolerance[rows]
         self.n_visited[rows[there]] += 1
         for row in rows[there]:
             self.route[row] = self.route[row][:, 1:]

@@ -8,6 +8,7 @@ from tussle.api import Autonomy, GroupView, Input, Output, Param, Publish, State
 from tussle.messages import GoalReached
 from tussle.numeric import atan2, cos, sin
 from tussle.numeric.quaternion import quat_rotate
+from tussle.numeric.ways import closest_approach
 from tussle.stock.autonomy.go_to_by_lidar import kernels
 
 
@@ -26,7 +27,7 @@ class GoToByLidar(Autonomy):
     to collisions. Points count if their height differs by less than `half_height`, so that a tilted lidar does not take the ground for
     an obstacle.
 
-    `GoalReached` is published when it comes within `tolerance` for the first time.
+    `GoalReached` is published when its way comes within `tolerance` for the first time.
     """
 
     grade = "portable"
@@ -75,7 +76,10 @@ class GoToByLidar(Autonomy):
     def step(self, g: GroupView) -> None:
         """Choose direction and speed."""
         distance = length(self.target[0] - g.pos[0], self.target[1] - g.pos[1])
-        rows = np.flatnonzero(~self.is_there & (distance <= self.tolerance))
+        x, y, _ = g.vel * g.dt
+        offset = np.stack([g.pos[0] - x - self.target[0], g.pos[1] - y - self.target[1], np.zeros(g.n)])
+        _, nearest = closest_approach(offset, np.stack([x, y, np.zeros(g.n)]))
+        rows = np.flatnonzero(~self.is_there & (nearest <= self.tolerance))
         self.is_there[rows] = True
         self.reached.publish(rows, entity=g.id[rows], team=g.team[rows], t=g.t[rows])
         free = np.empty(g.n)

@@ -23,12 +23,14 @@ SHAPING = (
 class Boundary(Interaction):
     """A cuboid, sphere, half-space, polyhedron, or polygon or cylinder between two heights.
 
-    Publishes its shape once (`BoundaryShape`) and each entry and exit (`BoundaryCrossed`).
+    Publishes its shape once (`BoundaryShape`) and each entry and exit (`BoundaryCrossed`). An entity that moves straight through the
+    region within one step enters and leaves it.
 
-    SCRIMMAGE ignored the rotation, and could not use a polyhedron.
+    SCRIMMAGE ignored the rotation, could not use a polyhedron, and did not see who was in the region between two steps.
     """
 
     grade = "portable"
+    reads_start_positions = True
     historic_attributes = HistoricAttributes(
         renamed={"id": "boundary_id", "team_id": "team", "type": "shape"},
         unread=("network_name",),
@@ -94,17 +96,22 @@ class Boundary(Interaction):
             w.publish(BoundaryShape, fresh, boundary=self.boundary_id, team=self.team, shape=self.region())
             self.is_told[fresh] = True
         inside = self.region().contains(w.pos)
-        rows = np.flatnonzero(self.is_known & (inside != self.was_inside))
-        if len(rows):
-            w.publish(
-                BoundaryCrossed,
-                w.world[rows],
-                entity=w.id[rows],
-                boundary=self.boundary_id,
-                inside=inside[rows],
-            )
+        changes = self.is_known & (inside != self.was_inside)
+        is_through = self._is_through(w, self.is_known & ~inside & ~self.was_inside)
+        for chosen, is_in in ((is_through, ~inside), (is_through | changes, inside)):
+            rows = np.flatnonzero(chosen)
+            if len(rows):
+                w.publish(
+                    BoundaryCrossed, w.world[rows], entity=w.id[rows], boundary=self.boundary_id, inside=is_in[rows]
+                )  # fmt: skip
         self.was_inside[:] = inside
         self.is_known[:] = True
+
+    def _is_through(self, w: WorldView, may: np.ndarray) -> np.ndarray:
+        """Return which of the entities that `may`, (n,), have gone through the region in the step, (n,)."""
+        rows = np.flatnonzero(may)
+        may[rows] = self.region().crossed(w.start_pos[:, rows], w.pos[:, rows])
+        return may
 
     @service
     def is_inside(self, pos: np.ndarray) -> np.ndarray:

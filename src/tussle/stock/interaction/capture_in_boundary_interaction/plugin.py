@@ -6,10 +6,18 @@ import numpy as np
 
 from tussle.api import Interaction, Param, State, WorldView
 from tussle.messages import EntityCaptured
+from tussle.numeric.ways import closest_approach
+from tussle.scene import Volume
+
+FAR = 1e150
+"""Length of a way that does not count [m]: its square would overflow."""
 
 
 class CaptureInBoundaryInteraction(Interaction):
-    """Entities of a boundary's team capture others within `capture_range`, if both are inside the boundary.
+    """Entities of a boundary's team capture others that come within `capture_range`, if both are inside the boundary.
+
+    In a step entities move straight; what counts is their least distance while the defender is ready, and whether each was inside at some
+    time of the step.
 
     Each intruder is captured by its nearest defender (on ties the smaller id). Without a cool-down, a defender captures all of these
     in one step; with one, the nearest, and then nobody until the cool-down has passed. In SCRIMMAGE distances were measured
@@ -20,6 +28,7 @@ class CaptureInBoundaryInteraction(Interaction):
     """
 
     grade = "portable"
+    reads_start_positions = True
 
     boundary_id = Param(1, structural=True, doc="Boundary that is defended by its team.")
     capture_range = Param(5.0, unit="m", ge=0.0, doc="Distance below which intruders are captured.")
@@ -32,7 +41,7 @@ class CaptureInBoundaryInteraction(Interaction):
 
     def step(self, w: WorldView) -> None:
         region = w.region(self.boundary_id)
-        is_inside = region.shape.contains(w.pos)
+        is_inside = self._is_inside(w, region.shape)
         now = w.t[w.world] + 1e-6 * w.dt
         defends = is_inside & (w.team == region.team) & (now >= self.ready_at)
         row, other, distance = self._near(w, np.where(defends, self.capture_range[w.world], 0.0))
@@ -53,8 +62,24 @@ class CaptureInBoundaryInteraction(Interaction):
 
     def _near(self, w: WorldView, reach: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Rows of defenders and of others nearer than `reach` [m], (n,), and their distances [m], (m,) each."""
-        near = w.near(reach, teams="other")
-        return near.row, near.other, near.distance
+        ways = w.pos - w.start_pos
+        x, y, z = ways
+        far = np.sqrt(x * x + y * y + z * z)
+        far = np.where(far < FAR, far, 0.0)
+        farthest = np.zeros(w.n_worlds)
+        np.maximum.at(farthest, w.world, far)
+        wide = reach + (1.0 + 1e-9) * (far + farthest[w.world])
+        near = w.near(np.where(reach > 0.0, wide, 0.0), teams="other")
+        row, other = near.row, near.other
+        offset, way = (v[:, other] - v[:, row] for v in (w.pos, ways))
+        begin = np.clip(1.0 - (w.t[w.world[row]] - self.ready_at[row]) / w.dt, 0.0, 1.0)
+        distance = np.minimum(closest_approach(offset - way, way, begin)[1], near.distance)
+        is_near = distance < reach[row]
+        return row[is_near], other[is_near], distance[is_near]
+
+    def _is_inside(self, w: WorldView, shape: Volume) -> np.ndarray:
+        """Return which entities were in a region during the step, (n,)."""
+        return shape.crossed(w.start_pos, w.pos)
 
 
 def _first_of(values: np.ndarray) -> np.ndarray:

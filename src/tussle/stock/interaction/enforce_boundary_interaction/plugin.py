@@ -8,13 +8,16 @@ from tussle.api import Interaction, Param, WorldView
 
 
 class EnforceBoundaryInteraction(Interaction):
-    """Removes entities that are outside all active boundaries, or inside a no-fly boundary, at the end of a step.
+    """Removes entities that are outside all active boundaries at the end of a step, or inside a no-fly boundary during the step.
+
+    During the step an entity moves straight, so that none is too fast for a narrow no-fly boundary.
 
     Raises:
         MissionError: An id is not that of exactly one boundary of the mission.
     """
 
     grade = "portable"
+    reads_start_positions = True
 
     active_boundary_ids = Param(
         (1, 2, 3, 4), ragged=True, doc="Boundaries of which entities must be in at least one; none if empty."
@@ -35,4 +38,4 @@ class EnforceBoundaryInteraction(Interaction):
             is_inside |= shape.contains(w.pos)
         w.kill(~is_inside, "outside the boundary")
         for shape in forbidden:
-            w.kill(shape.contains(w.pos), "in a no-fly region")
+            w.kill(shape.crossed(w.start_pos, w.pos), "in a no-fly region")

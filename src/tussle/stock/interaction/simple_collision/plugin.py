@@ -6,19 +6,21 @@ from typing import Any
 
 import numpy as np
 
-from tussle.api import Interaction, Param, WorldView, neighbors
-from tussle.api.laws import Listed
+from tussle.api import Interaction, Param, WorldView
 from tussle.messages import EntityCollided
+from tussle.stock.interaction.simple_collision.kernels import measure, swept_pairs
 
 
 class SimpleCollision(Interaction):
-    """Removes both entities of each pair nearer than `collision_range`.
+    """Removes both entities of each pair that comes nearer than `collision_range`.
 
-    Initial positions nearer than `startup_collision_range` to another entity are rejected. All pairs of a step collide; the existing
-    system took the first pair of a cluster and spared the rest.
+    Entities move straight from their positions at the start of a step to those at its end, so that none is too fast to collide. Initial
+    positions nearer than `startup_collision_range` to another entity are rejected. All pairs of a step collide; SCRIMMAGE takes the
+    first pair of a cluster and spares the rest, and measures at the end of the step.
     """
 
     grade = "portable"
+    reads_start_positions = True
 
     collision_range = Param(2.0, unit="m", ge=0.0, doc="Distance below which two entities collide.")
     startup_collision_range = Param(2.0, unit="m", ge=0.0, doc="Least distance of initial positions.")
@@ -28,40 +30,51 @@ class SimpleCollision(Interaction):
     enable_non_team_collisions = Param(True, doc="Entities of different teams collide.")
 
     def start(self, w: WorldView) -> None:
-        self._collide(w)
+        self._collide(w, w.pos)
 
     def step(self, w: WorldView) -> None:
         if not self.startup_collisions_only:
-            self._collide(w)
+            self._collide(w, self._begin(w))
 
-    @neighbors("collision_range", first="each", second="each", first_team="each", second_team="each")
-    @staticmethod
-    def meet(
-        id: int, other_id: int, team: int, other_team: int,  # noqa: A002 - a column
-        enable_team_collisions: bool, enable_non_team_collisions: bool,
-    ) -> tuple[int, ...] | None:  # fmt: skip
-        if id > other_id or not (
-            enable_team_collisions if team == other_team else enable_non_team_collisions
-        ):
-            return None
-        return id, other_id, team, other_team
+    def _begin(self, w: WorldView) -> np.ndarray:
+        """Positions at which the ways of the step begin [m], (3, n)."""
+        return w.start_pos
 
-    def _collide(self, w: WorldView) -> None:
-        met = self.meet(w)
-        if not len(met):
+    def _collide(self, w: WorldView, begin: np.ndarray) -> None:
+        first, second = self._pairs(w, begin)
+        if not len(first):
             return
-        k = self._colliding(w, met)
+        k = self._colliding(w, first, second)
+        first, second = first[k], second[k]
         w.publish(
             EntityCollided,
-            w.world[met.row[k]],
-            first=met.first[k],
-            second=met.second[k],
-            first_team=met.first_team[k],
-            second_team=met.second_team[k],
+            w.world[first],
+            first=w.id[first],
+            second=w.id[second],
+            first_team=w.team[first],
+            second_team=w.team[second],
         )
-        w.kill(np.unique(np.concatenate([met.row[k], met.other[k]])), "collision")
+        w.kill(np.unique(np.concatenate([first, second])), "collision")
 
-    def _colliding(self, w: WorldView, met: Listed) -> Any:
+    def _pairs(self, w: WorldView, begin: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Rows of the pairs that come within range, the smaller id first, ordered by ids, (m,) each."""
+        limit, far = self.collision_range[w.world], np.empty(w.n)
+        index = w.index(float(limit.max(initial=0.0)) + 2.0 * measure(w.pos, begin, far))
+        rows = w.id, w.team, index.row_world, index.place, index.order
+        enabled = self.enable_team_collisions[w.world], self.enable_non_team_collisions[w.world]
+        table = (*index.table, w.by_place(index, "team")[0])
+        room, n_pairs = -1, 16 + w.n
+        while n_pairs > room:  # repeat with more room if the pairs did not fit
+            room = n_pairs
+            first, second = np.empty(room, np.int64), np.empty(room, np.int64)
+            n_pairs = swept_pairs((w.pos, begin, far), limit, enabled, rows, table, (first, second))
+        first, second = first[:n_pairs], second[:n_pairs]
+        if not n_pairs:
+            return first, second
+        order = np.lexsort((w.id[second], w.id[first], w.world[first]))
+        return first[order], second[order]
+
+    def _colliding(self, w: WorldView, first: np.ndarray, second: np.ndarray) -> Any:
         """Return the indices of the pairs within range that collide."""
         return slice(None)
 
