@@ -80,3 +80,13 @@ def shown(site: Path, page: str) -> str:
     """Text of a page, with single spaces."""
     text = html.unescape(re.sub(r"<[^>]+>", "", (site / page / "index.html").read_text()))
     return " ".join(text.split())
+
+
+@pytest.mark.needs("mkdocs")
+def test_a_site_that_mike_builds_has_a_switch_of_versions(monkeypatch):
+    from mkdocs.config import load_config
+    from site_hooks import on_config
+
+    assert "version" not in on_config(load_config(str(ROOT / "mkdocs.yml"))).extra
+    monkeypatch.setenv("MIKE_DOCS_VERSION", "0.2")
+    assert on_config(load_config(str(ROOT / "mkdocs.yml"))).extra["version"] == {"provider": "mike"}
