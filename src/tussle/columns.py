@@ -218,7 +218,7 @@ class Param(Numbers):
         """Check a value and convert it to plain Python in SI units. A number is SI; a text is parsed as in a mission file.
 
         Args:
-            value: A number; a text: "40 kt", "40" in `text_unit`, "1, 0.2, 1, 45" for several fields, "[ 0 1 ] [ 2 3 ]" for a list,
+            value: A number; a text: "40 kt", "40" in `text_unit`, "1, 0.2, 1, 45" for several fields, `[ 0 1 ] [ 2 3 ]` for a list,
                 "true"; or a sequence of numbers and texts.
             where: Place for the error message.
             from_geodetic: Converts latitude, longitude [rad], altitude [m], (3,), to a world position [m]; used for rows that begin
@@ -446,7 +446,7 @@ class Children(Column):
         kind: Base class of the plugins.
         by_state: They may have `states`, in which they act (see `tussle.api.StateFollower`).
         shares_channels: Their channels are those of the entity; otherwise they are private to the outer plugin.
-        fields: Text parameters of `kind`, if a mission file gives each plugin as a row of their values: "[ a b ] [ c d ]".
+        fields: Text parameters of `kind`, if a mission file gives each plugin as a row of their values: `[ a b ] [ c d ]`.
         doc: One-line description.
     """
 

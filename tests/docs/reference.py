@@ -6,6 +6,8 @@ import importlib
 import inspect
 import re
 from collections.abc import Iterator, Mapping
+from functools import cache
+from types import FunctionType
 from typing import Any
 
 from pages import ROOT
@@ -27,7 +29,10 @@ PARTS = {
     "tussle.record": "Recordings",
     "tussle.batch": "Batches and searches",
     "tussle.view": "Views",
+    "tussle.rl": "Learning",
+    "tussle.plan": "Planning",
     "tussle.testing": "Tests of plugins",
+    "tussle.errors": "Errors",
 }
 HOOKS = (
     "step",
@@ -57,6 +62,7 @@ All public names, from their docstrings and declarations. This page is written b
 SECTION = re.compile(r"^(Args|Attributes|Raises|Returns|Yields):$", re.MULTILINE)
 
 
+@cache
 def public(module: str) -> dict[str, Any]:
     """Names of a module that are public, with what they name, in alphabetical order."""
     found = importlib.import_module(module)
@@ -126,7 +132,7 @@ def described(doc: str) -> str:
     lines = [text.strip(), ""]
     for title, body in zip(sections[::2], sections[1::2], strict=True):
         items = re.split(r"\n(?=    \S)", "\n" + body.strip("\n"))[1:]
-        lines += [f"{title}:", *(f"- {' '.join(item.split())}" for item in items), ""]
+        lines += [f"{title}:", "", *(f"- {' '.join(item.split())}" for item in items), ""]
     return "\n".join(lines)
 
 
@@ -153,14 +159,42 @@ def about(column: Column) -> str:
     return f"{kind}{names}{default}{f' ({takes})' if takes else ''}. {column.doc}".replace("\n", ", ").strip()
 
 
+@cache
+def documented_classes() -> set[type]:
+    """Public classes, but for the plugins that ship, which have a page each."""
+    modules = (module for module in PARTS if module != "tussle.stock")
+    return {value for module in modules for value in public(module).values() if inspect.isclass(value)}
+
+
+def own_bases(cls: type) -> Iterator[type]:
+    """A class, and those of its bases in tussle that have no entry of their own."""
+    yield cls
+    for base in cls.__mro__[1:]:
+        if base.__module__.startswith("tussle") and base not in documented_classes():
+            yield base
+
+
+def members_with_docs(cls: type) -> Iterator[tuple[str, str]]:
+    """Public names of a class that are declarations, methods or properties, and their text."""
+    for name, value in vars(cls).items():
+        is_member = isinstance(value, (property, classmethod, staticmethod, FunctionType))
+        doc = about(value) if isinstance(value, Column) else is_member and inspect.getdoc(value)
+        if doc and name[0] != "_":
+            yield name, doc
+
+
+def inherited(value: Any) -> list[str]:
+    """Public names that a class has from bases that have no entry of their own."""
+    if not inspect.isclass(value):
+        return []
+    found = {name for base in own_bases(value) for name, _ in members_with_docs(base)}
+    return sorted(found - {*vars(value)})
+
+
 def members(cls: type) -> Iterator[str]:
     """Public methods and properties, those of base classes of ours included."""
     seen = set() if cls.__module__.startswith("tussle.api") else set(HOOKS)
-    for base in cls.__mro__:
-        if not base.__module__.startswith("tussle") or (
-            base is not cls and base.__name__ in public("tussle.api")
-        ):
-            continue
+    for base in own_bases(cls):
         for name, value in vars(base).items():
             function = getattr(value, "__func__", value)
             if name[0] == "_" or name in seen or isinstance(value, Column):

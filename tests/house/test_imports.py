@@ -31,6 +31,7 @@ NUMPY_FOR_KERNELS = {
     *("sqrt", "floor", "abs", "minimum", "maximum", "isnan", "isfinite"),
 }
 OF_ROS = {"rospy", "geometry_msgs", "nav_msgs", "sensor_msgs"}  # packages of Debian, which `.ci/run` installs
+OF_SITE = {"griffe", "mkdocs"}  # of the extra `docs`, which `.ci/run` installs
 OTHERS = {"opendis", "actors_pb2", "actors_pb2_grpc", "command_pb2", "command_pb2_grpc"}
 """A package that `.ci/run` installs without its dependencies, and modules that tests let protoc generate."""
 IMPORTED_AS = {
@@ -119,7 +120,7 @@ def test_kernels_take_from_numpy_only_what_is_the_same_on_every_machine():
 
 def test_declared_dependencies_are_the_imported_ones():
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
-    extras = [name for name in project["optional-dependencies"] if name not in ("test", "frames")]
+    extras = [name for name in project["optional-dependencies"] if name not in ("test", "frames", "docs")]
     used = {name.lower() for name in third_party("src")}
     declared = requirements(project, *extras)
     assert used - {"llvmlite", "mpl_toolkits", "vtkmodules"} == declared, (
@@ -149,7 +150,7 @@ def test_packages_of_extras_are_imported_where_they_are_used():
 def test_what_tests_and_examples_import_is_in_the_test_extra(tree):
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     used, declared = third_party(tree), requirements(project, "test")
-    allowed = declared | OF_ROS | OTHERS | {"_pytest"}
+    allowed = declared | OF_ROS | OF_SITE | OTHERS | {"_pytest"}
     missing = {name: place for name, place in used.items() if name.lower() not in allowed}
     assert not missing
 

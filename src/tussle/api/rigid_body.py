@@ -18,7 +18,7 @@ from tussle.numeric.row_kernel import Number, RowCall
 
 
 class InertiaParam(Param):
-    """An inertia tensor about the center of mass, body frame, written as "[ xx xy xz ] [ yx yy yz ] [ zx zy zz ]" or nine numbers.
+    """An inertia tensor about the center of mass, body frame, written as `[ xx xy xz ] [ yx yy yz ] [ zx zy zz ]` or nine numbers.
 
     Args:
         default: The nine elements, row by row.

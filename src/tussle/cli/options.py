@@ -158,7 +158,7 @@ class PluginOptions:
 
 @dataclass(frozen=True, kw_only=True)
 class MissionOptions(PluginOptions):
-    """Check a mission: read it, build its game, and report all errors; the missions of a folder: show a table; a run or batch: report damage."""
+    """Check a mission, or all of a folder: read it, build its game, report all errors. Check a run or batch directory: report all damage."""
 
     mission: Annotated[
         str,

@@ -103,7 +103,7 @@ WORLD = {
         reads="text",
     ),
     "building": TagSpec(
-        "A polygon extruded upwards that rays meet (addition to the format). Attributes: `corners`, such as '[0 0] [9 0] [9 5]' [m], "
+        "A polygon extruded upwards that rays meet (addition to the format). Attributes: `corners`, such as `[0 0] [9 0] [9 5]` [m], "
         "`low` and `high`, the heights of its ends [m].",
         reads="text",
     ),
