@@ -18,6 +18,8 @@ from tussle.displays import line, page, shortened, table
 from tussle.errors import DeclarationError, ParameterError, UnitError, nearest_name
 
 PER = ("entity", "world", "team")
+MAX_NUMBER = 1e30
+"""Largest finite number of a parameter: with larger ones, products of a few overflow."""
 MOST_INTEGER = 2**53
 """All integers up to this magnitude are exact in float64."""
 
@@ -278,6 +280,8 @@ class Param(Numbers):
         number = int(value) if self.dtype is int else float(value)
         if not self.is_within(number):
             raise self._error(where, value, self.allowed())
+        if MAX_NUMBER < abs(number) < math.inf:
+            raise self._error(where, value, f"{self.allowed()} and of at most {MAX_NUMBER:g}")
         return number
 
     def is_within(self, number: float) -> bool:

@@ -174,7 +174,7 @@ def test_many_worlds_and_values_stay_small():
 def test_places_that_cannot_be_drawn_are_left_out(position):
     blocks = [
         Block(name="a", count=2, position=position, variance=(1e18, 0, 0), motion=Still()),
-        Block(name="b", position=(-1e9, 1e9, 0), heading=1e300, motion=Still()),
+        Block(name="b", position=(-1e9, 1e9, 0), heading=1e30, motion=Still()),
     ]
     mission = Mission(blocks=blocks)
     check(mission)

@@ -8,21 +8,15 @@ from __future__ import annotations
 
 import re
 import struct
+import zlib
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import BinaryIO, NamedTuple
+from typing import Any, BinaryIO, NamedTuple
 
 import pyarrow as pa
 
-from tussle.checksums import (
-    BLANK,
-    N_DIGITS,
-    as_digits,
-    crc_of_part,
-    crc_of_zeros,
-    crc_with_zeros,
-    find_seal,
-)
+from tussle.checksums import BLANK, N_DIGITS, as_digits, crc_of_part, crc_of_zeros, find_seal, sealed
 from tussle.documents import size_of
 
 MOST_HEAD = 1 << 24
@@ -87,23 +81,57 @@ class StreamBlocks:
         return self.intact[-1].end if self.intact else 0
 
 
-def sealed_blocks(batch: pa.RecordBatch) -> tuple[memoryview, memoryview]:
-    """The schema of a batch, and the batch with its dictionaries, each as a block with its checksum."""
-    sink = pa.BufferOutputStream()
+class _Pieces:
+    """A file that keeps references to what an Arrow writer writes, and copies nothing."""
+
+    closed = False
+
+    def __init__(self) -> None:
+        self._held: list[Any] = []
+
+    def write(self, data: Any) -> int:
+        self._held.append(data)
+        return len(data)
+
+    def flush(self) -> None: ...
+
+    def close(self) -> None: ...
+
+    def messages(self) -> Iterator[tuple[bytes, list[Any]]]:
+        """Head and metadata, and pieces of the body, of each message."""
+        pieces = iter(self._held)
+
+        def take(n: int) -> list[Any]:
+            found = []
+            while n > 0:
+                found.append(next(pieces))
+                n -= len(found[-1])
+            assert n == 0, "a piece belongs to one part of a message"
+            return found
+
+        while (head := b"".join(take(8))) != END_MARK:
+            metadata = b"".join(take(int.from_bytes(head[4:], "little")))
+            yield head + metadata, take(_metadata(metadata, 0)[1])
+
+
+def sealed_blocks(batch: pa.RecordBatch) -> tuple[bytes, list[Any]]:
+    """The schema of a batch as a block with its checksum; and the batch with its dictionaries, in pieces, as another one."""
+    pieces = _Pieces()
     schema = batch.schema.with_metadata({**(batch.schema.metadata or {}), KEY: BLANK})
-    with pa.ipc.new_stream(sink, schema) as writer:
+    with pa.ipc.new_stream(pa.PythonFile(pieces, mode="w"), schema) as writer:
         writer.write_batch(batch, custom_metadata={KEY: BLANK})
-    buffer = sink.getvalue()
-    data, file = memoryview(buffer).cast("B"), pa.BufferReader(buffer)
-    first = _block(file, 0, len(data))
-    assert first is not None
-    second = _block(file, first.end, len(data))
-    assert second is not None
-    for start, end, _, digits in (first, second):
-        assert digits is not None
-        crc = crc_with_zeros(data[start:end], digits - start)
-        data[digits : digits + N_DIGITS] = as_digits(crc)
-    return data[: first.end], data[first.end : second.end]
+    (first, _), *others = pieces.messages()
+    block: list[Any] = []
+    for head, body in others:
+        block += [head, *body]
+    head = others[-1][0]
+    digits = find_seal(head)
+    assert digits is not None
+    crc = 0
+    for piece in block:
+        crc = zlib.crc32(piece, crc)
+    block[-1 - len(others[-1][1])] = head[:digits] + as_digits(crc) + head[digits + N_DIGITS :]
+    return sealed(first), block
 
 
 def find_blocks(path: Path, *, is_checked: bool = True) -> StreamBlocks:

@@ -10,6 +10,9 @@ import pyarrow as pa
 from tussle.errors import RecordError
 from tussle.record.arrow_blocks import END_MARK, sealed_blocks
 
+MAX_JOINED = 1 << 18
+"""Size of a block up to which its pieces are written at once [B]; copying a larger one costs more than the calls."""
+
 
 class Stream:
     """An Arrow stream in a file, in blocks with checksums. When `write` returns, the batch is with the operating system.
@@ -34,7 +37,10 @@ class Stream:
         try:
             if not self._end:
                 self._file.write(schema)
-            self._file.write(block)
+            if sum(map(len, block)) <= MAX_JOINED:
+                block = [b"".join(block)]
+            for piece in block:
+                self._file.write(piece)
             self._end = self._file.tell()
         except OSError as error:
             self._truncate()

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import contextlib
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from tussle.api import PositiveParam
-from tussle.columns import Handle, Param
+from tussle.columns import MAX_NUMBER, Handle, Param
 from tussle.engine.simulation import Simulation
-from tussle.errors import ConformanceError, MissionError, PluginError
+from tussle.errors import ConformanceError, MissionError, ParameterError, PluginError
 from tussle.testing.game import ConformanceGame
 from tussle.testing.lines import lines_of
 
@@ -21,6 +21,10 @@ RULE = "finite"
 STEPS = 8
 NEAR = 1e-6
 """Distance to an exclusive bound at which a parameter is tried, relative to its default's distance."""
+
+
+MAX_WORLDS = 300
+EXTREMES = (0.0, 1e-300, -1e-300, MAX_NUMBER, -MAX_NUMBER)
 
 
 @dataclass(frozen=True)
@@ -38,27 +42,56 @@ def check_limits(game: ConformanceGame) -> None:
     Raises:
         ConformanceError: A number is not finite, or the plugin raises an error.
     """
-    cls = type(game.plugin)
-    cases = [Case("", None, "with the default parameters"), *_cases(game)]
-    most = Handle.most_worlds(cls) or len(cases)
+    _check(game, [Case("", None, "with the default parameters"), *_cases(game, _values)], STEPS)
+
+
+def check_extremes(game: ConformanceGame) -> None:
+    """With each parameter at 0, its default's negative, and the smallest and largest numbers, the first step is finite or refused.
+
+    Raises:
+        ConformanceError: A number is not finite, or the plugin raises an error.
+    """
+    _check(game, [case for case in _cases(game, _extremes) if _is_taken(game.plugin, case)], 1)
+
+
+def _check(game: ConformanceGame, cases: list[Case], n_steps: int) -> None:
+    most = Handle.most_worlds(type(game.plugin)) or MAX_WORLDS
     for first in range(0, len(cases), most):
         some = cases[first : first + most]
         try:
-            _play(game, some)
+            _play(game, some, n_steps)
         except MissionError:  # such as no free position for an entity, which is allowed
             for case in some:
                 with contextlib.suppress(MissionError):
-                    _play(game, [case])
+                    _play(game, [case], n_steps)
 
 
-def _cases(game: ConformanceGame) -> Iterator[Case]:
+def _is_taken(plugin: Any, case: Case) -> bool:
+    """Return True if a plugin does not refuse a value."""
+    try:
+        plugin.replace(**{case.name: case.value})
+    except ParameterError:
+        return False
+    return True
+
+
+def _extremes(column: Param, default: Any) -> Iterator[Any]:
+    """Extreme values of one number, without its default."""
+    if column.dtype is bool or column.choices:
+        return
+    for value in dict.fromkeys(map(column.dtype, (*EXTREMES, -default if math.isfinite(default) else 0.0))):
+        if value != default and column.is_within(value):
+            yield value
+
+
+def _cases(game: ConformanceGame, values: Callable[[Param, Any], Iterator[Any]]) -> Iterator[Case]:
     for name, column in game.plugin.params().items():
         if column.is_row_data:
             default = game.plugin.values[name]
             parts = default if column.fields else (default,)
             for i, part in enumerate(parts):
                 field = f".{column.fields[i]}" if column.fields else ""
-                for value in _values(column, part):
+                for value in values(column, part):
                     whole = (*parts[:i], value, *parts[i + 1 :]) if column.fields else value
                     yield Case(name, whole, f"with {name}{field} = {value!r}")
 
@@ -82,7 +115,7 @@ def _values(column: Param, default: Any) -> Iterator[Any]:
             yield value
 
 
-def _play(game: ConformanceGame, cases: list[Case]) -> None:
+def _play(game: ConformanceGame, cases: list[Case], n_steps: int) -> None:
     plugin = game.plugin
     params: dict[str, list[Any]] = {}
     for name, column in plugin.params().items():
@@ -94,7 +127,7 @@ def _play(game: ConformanceGame, cases: list[Case]) -> None:
     with np.errstate(all="ignore"):
         try:
             with Simulation(game.quiet, seeds, params, on_error="raise") as sim:
-                for step in range(STEPS):
+                for step in range(n_steps):
                     sim.step()
                     world, text = _not_finite(sim)
                     if text:

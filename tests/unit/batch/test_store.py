@@ -253,37 +253,24 @@ def test_zeros_at_the_end_of_a_part_are_no_runs(mission, tmp_path):
 # -- what is no batch, or a damaged one ---------------------------------------------------------------------------------------
 
 
-def loaded(path):
-    """A batch, or what was said of it."""
-    try:
-        return load_batch(path), ""
-    except BatchError as error:
-        return None, str(error)
-
-
 @pytest.mark.parametrize("name", [store.RESULTS_FILE, store.ALIVE_FILE])
-def test_a_table_that_is_damaged_is_refused_and_never_believed(mission, reference, name):
+def test_a_table_that_is_damaged_is_told_and_never_believed(mission, reference, name):
     file = reference / name
     data = file.read_bytes()
-    wanted = tables_of(reference)
-    n_refused = 0
+    wanted = tables_of(reference)[0].to_pylist()
     for place in [*range(0, len(data), 41), len(data) - 1]:
         changed = bytearray(data)
         changed[place] ^= 0xFF
         file.write_bytes(bytes(changed))
-        found, said = loaded(reference)
-        if found is None:
-            assert said.startswith(f"{file}: ")
-            n_refused += 1
-        else:
-            assert (found.table.drop_columns(["cpu_s", "host"]), found.alive) == wanted[:2]
-    assert n_refused > 10
+        found = load_batch(reference)
+        assert any(note.startswith(name) for note in found.notes), place
+        assert all(row in wanted for row in found.table.drop_columns(["cpu_s", "host"]).to_pylist())
     for size in (0, 1, 100, len(data) - 1):
         file.write_bytes(data[:size])
-        with pytest.raises(BatchError, match="cannot be read"):
-            load_batch(reference)
-        with pytest.raises(BatchError, match="cannot be read"):
-            play(batch_of(mission, 7), reference)
+        assert load_batch(reference).n_runs == 0
+    with pytest.warns(RuntimeWarning, match=f"{name} cannot be read.* are played again"):
+        play(batch_of(mission), reference)
+    assert tables_of(reference)[0].to_pylist() == wanted
     pq.write_table(pa.table({"run": [1]}), file)
     with pytest.raises(BatchError, match="is another table; it has no column"):
         load_batch(reference)

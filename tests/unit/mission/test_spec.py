@@ -129,7 +129,7 @@ def test_blocks_that_cannot_be(values, message):
 @pytest.mark.parametrize(
     ("values", "message"),
     [
-        ({"end": 1e308, "dt": 1e-300}, r"mission: end = 1e\+308 with dt = 1e-300 is not allowed"),
+        ({"end": 1e30, "dt": 1e-300}, r"mission: end = 1e\+30 with dt = 1e-300 is not allowed"),
         ({"blocks": [5]}, r"mission: 5 is not a Block"),
         ({"blocks": 5}, r"mission: blocks = 5 is not allowed; it takes a list of Block"),
         ({"blocks": block()}, r"mission: blocks = <Block .* is not allowed; it takes a list of Block"),

@@ -1,7 +1,9 @@
 """Damage to one block of a file is told, and stops nothing else."""
 
+import itertools
 import json
 import shutil
+from types import SimpleNamespace
 
 import gambles
 import numpy as np
@@ -14,7 +16,7 @@ from tussle import load_run
 from tussle.batch import Batch, InProcess, load_batch, store
 from tussle.batch.damage import damage_in_batch
 from tussle.errors import BatchError, RecordError
-from tussle.record import parquet_blocks
+from tussle.record import parquet_blocks, recorder
 from tussle.record.arrow_blocks import find_blocks
 from tussle.record.arrow_file import read_batches
 from tussle.record.damage import damage_in_run
@@ -201,3 +203,13 @@ def test_the_command_tells_damage(recorded, run):
     result = call("check", run)
     assert result.returncode == 1
     assert "events.arrow is damaged" in result.stderr
+
+
+def test_a_clock_that_jumps_changes_nothing(tmp_path, monkeypatch):
+    times = itertools.cycle((5.0, -1e9, 1e9, 7.0))
+    monkeypatch.setattr(recorder, "time", SimpleNamespace(monotonic=lambda: next(times)))
+    jumped = record(hunt(end=1.0), tmp_path / "jumped")
+    assert damage_in_run(jumped) == ([], [])
+    run = load_run(jumped)
+    assert run.is_complete
+    assert np.unique(run.trajectory_table["step"].to_numpy()).tolist() == list(range(11))

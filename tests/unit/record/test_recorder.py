@@ -78,7 +78,9 @@ def test_a_run_directory_holds_what_it_should(tmp_path):
     assert run.notes == []
     assert run.mission == "<run/>\n"
     info = json.loads((run.path / "run.json").read_text())
+    assert info.pop("checksum").startswith("tussle-crc32:")
     assert info == run.info
+    assert set(info["checksums"]) == {"mission.xml", "summary.csv"}
     assert info["parameters"] == {"prey.speed": 3.0}
     assert set(info["versions"]) == {"python", "tussle", "numpy", "numba", "pyarrow"}
     assert info["grade"] == sim.grade
