@@ -61,6 +61,10 @@ class MotionBody(GroupView):
         derive(name, self._bodies.quat, self.first + first, self.first + last, self.first, out)
         return out
 
+    def remove(self, row: int) -> None:
+        """Remove the entity of a row at the end of this step, by a health of 0."""
+        self._bodies.health[self.first + row] = 0.0
+
     def set_attitude(self, roll: Any = 0.0, climb: Any = 0.0, yaw: Any = 0.0) -> None:
         """Write quat from bank (right wing down positive), elevation (nose up positive) and heading [rad], each (n,) or a number."""
         flat = np.zeros(self.n)

@@ -5,7 +5,8 @@ from __future__ import annotations
 GAME = """<runscript name="{0}"><run end="1"/><entity><autonomy>{0}</autonomy>
 <controller>SimpleAircraftControllerPID</controller><motion_model>SimpleAircraft</motion_model></entity></runscript>"""
 STICK = """<runscript name="stick"><run end="1"/><entity><controller device="/dev/input/js9" axis_map="[ velocity_x 1 -1 1 -1 1 1 ]
-[ velocity_y 0 -1 1 -1 1 1 ] [ velocity_z 0 -1 1 -1 1 1 ]">JoystickController</controller><motion_model>SingleIntegrator</motion_model></entity></runscript>"""
+[ velocity_y 0 -1 1 -1 1 1 ]
+[ velocity_z 0 -1 1 -1 1 1 ]">JoystickController</controller><motion_model>SingleIntegrator</motion_model></entity></runscript>"""
 PART = '<runscript name="p" xmlns:xi="http://www.w3.org/2001/XInclude"><xi:include href="../part.xml"/></runscript>'
 
 

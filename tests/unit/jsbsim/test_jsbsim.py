@@ -12,7 +12,7 @@ import pytest
 
 from tussle import Block, Mission, Simulation, stock
 from tussle.api import Autonomy, Output
-from tussle.errors import ParameterError, TussleError
+from tussle.errors import ParameterError, PluginError, TussleError
 from tussle.geodesy import Origin
 from tussle.mission import read_mission
 from tussle.scene import Scene
@@ -244,3 +244,57 @@ def test_examples_fly_alone_as_in_a_stack(name):
         sim.step(50)
         alone.step(50)
         assert sim.state_hash(1) == alone.state_hash()
+
+
+@pytest.mark.parametrize("processes", [1, 2])
+def test_an_aircraft_that_is_no_longer_finite_ends_its_world_or_is_removed_alone(processes):
+    good = JSBSimControl(aircraft="c172p", processes=processes)
+    windy = good.replace(wind=(1e200, 0.0, 0.0))
+    two = mission(good)
+    lost = two.blocks[0].replace(name="lost", position=(0.0, 0.0, 900.0), motion=windy)
+    two = two.replace(blocks=[*two.blocks, lost])
+    with pytest.raises(
+        PluginError, match=r"JSBSimControl, lost 2, .*the state is not finite of .* after .* s: \w+"
+    ):
+        Simulation(two).step(60)
+    removed = two.replace(blocks=[two.blocks[0], lost.replace(motion=windy.replace(on_failure="remove"))])
+    result = Simulation(removed.replace(end=0.5)).run()[0]
+    assert result.error is None
+    assert result.alive == {0: 1}
+
+
+def fan(folder):
+    """A root of JSBSim with an aircraft of 6 kg whose electric motor starts at full power in flight."""
+    for name, text in {
+        "aircraft/fan/fan.xml": FAN,
+        "engine/motor.xml": MOTOR,
+        "engine/blades.xml": BLADES,
+    }.items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_text(text)
+    return str(folder)
+
+
+FAN = """<fdm_config name="fan" version="2.0"><metrics>
+<wingarea unit="M2">1</wingarea><wingspan unit="M">2.7</wingspan><chord unit="M">0.4</chord>
+<location name="AERORP" unit="M"><x>0</x><y>0</y><z>0</z></location></metrics>
+<mass_balance><ixx unit="KG*M2">2.6</ixx><iyy unit="KG*M2">2.1</iyy><izz unit="KG*M2">2.6</izz><emptywt unit="KG">6</emptywt>
+<location name="CG" unit="M"><x>0</x><y>0</y><z>0</z></location></mass_balance><ground_reactions/>
+<propulsion><engine file="motor">
+<thruster file="blades"><location unit="M"><x>-1</x><y>0</y><z>0</z></location></thruster></engine></propulsion>
+<flight_control name="fcs"/><aerodynamics/></fdm_config>"""
+MOTOR = '<electric_engine name="motor"><power unit="WATTS">2200</power></electric_engine>'
+BLADES = """<propeller name="blades"><ixx>0.00085</ixx><diameter unit="IN">18</diameter><numblades>2</numblades><minpitch>30</minpitch>
+<maxpitch>30</maxpitch><table name="C_THRUST" type="internal"><tableData>0 0.08
+1.4 -0.05</tableData></table><table name="C_POWER" type="internal"><tableData>0 0.09
+1.4 -0.08</tableData></table></propeller>"""
+
+
+def test_a_propeller_that_begins_to_turn_does_not_throw_the_aircraft_over(tmp_path):
+    """2.2 kW at some 10,000 rpm is a torque of 2 N m: the aircraft of 2.6 kg m^2 turns by less than 50 deg/s after a second."""
+    sim = Simulation(mission(JSBSimControl(aircraft="fan", jsbsim_root=fan(tmp_path)), end=2.0))
+    fastest = 0.0
+    for _ in range(120):
+        sim.step()
+        fastest = max(fastest, float(np.abs(body(sim, "omega")).max()))
+    assert 0.0 < math.degrees(fastest) < 100.0

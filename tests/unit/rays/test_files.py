@@ -405,7 +405,8 @@ def test_a_terrain_that_is_elsewhere_is_noted(tmp_path):
     )
     assert loaded.mission.scene.terrain is None
     assert any(
-        "there is no 'mcmillan' beside the mission, so the mission has no terrain" in note
+        "there is no 'mcmillan' beside the mission or in a folder of data (--data-path), so the mission has no terrain"
+        in note
         for note in loaded.notes
     )
     assert any("did you mean 'center'" in note for note in loaded.notes)

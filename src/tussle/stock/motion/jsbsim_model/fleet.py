@@ -71,7 +71,7 @@ class Fleet:
                 try:
                     flight = self.flights[number]
                     act(flight, own)
-                    state = flight.state()
+                    state = flight.finite_state()
                 except Exception as error:  # noqa: BLE001 - JSBSim raises what its C++ code throws
                     self._fail(number, error)
             read.extend(state)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 import os
 import re
 import tempfile
 from array import array
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple, Self
@@ -32,6 +33,8 @@ THROTTLES = "fcs/throttle-cmd-norm"
 WIND = "atmosphere/wind-north-fps", "atmosphere/wind-east-fps", "atmosphere/wind-down-fps"
 USE = re.compile(r"""<use\s[^>]{0,500}?\baircraft\s*=\s*["']([^"'<>]{1,200})["']""")
 """The tag of a script that names its aircraft."""
+NOT_FINITE = "JSBSim: the state is not finite"
+"""Begin of the error of an aircraft whose state is NaN or infinite."""
 TRIMS = {"none": -1, "longitudinal": 0, "full": 1, "ground": 2}
 Placing = tuple[Sequence[float], Origin]
 """Arguments of `JSBSimFlight.place`."""
@@ -61,6 +64,24 @@ class Aircraft(NamedTuple):
     needed: tuple[str, ...]
 
 
+STANDING = 1.0
+"""Speed of a propeller that stands [1/min], as JSBSim has it; a wind turns it."""
+
+
+class Propeller(NamedTuple):
+    """A propeller of an aircraft.
+
+    Attributes:
+        rpm: Returns its speed [1/min].
+        set_sense: Sets the sense of its rotation, a factor of its torque.
+        sense: Its sense, 1 or -1.
+    """
+
+    rpm: Callable[[], float]
+    set_sense: Callable[[float], None]
+    sense: float
+
+
 class JSBSimFlight:
     """An aircraft of JSBSim and the record of its flight. JSBSim cannot save its state, but a replay of the flight is bit-identical.
 
@@ -85,6 +106,12 @@ class JSBSimFlight:
             for each in (throttles if name == THROTTLES else (name,))
         ]
         self.read = [nodes(name, True).get_double_value for name in STATE]
+        self.propellers = [
+            Propeller(rpm.get_double_value, sense.set_double_value, sense.get_double_value())
+            for i in range(n_engines)
+            if (rpm := nodes(f"propulsion/engine[{i}]/propeller-rpm", False))
+            and (sense := nodes(f"propulsion/engine[{i}]/propeller-sense", False))
+        ]
         self.history: list[tuple[Placing, array[float]]] = []
 
     def place(self, values: Sequence[float], origin: Origin) -> None:
@@ -131,13 +158,37 @@ class JSBSimFlight:
         self.history[-1][1].extend((*values, n_steps))
         for write, k in self.write:
             write(values[k])
-        run = self.fdm.run
         for _ in range(n_steps):
-            run()
+            self._step()
 
-    def state(self) -> list[float]:
-        """Values of the properties STATE."""
-        return [read() for read in self.read]
+    def _step(self) -> None:
+        """Make one step.
+
+        A propeller that stands has no torque in it: JSBSim divides by its speed, so that one that begins to turn would have a thousand
+        times the torque of full power.
+        """
+        standing = [propeller for propeller in self.propellers if propeller.rpm() < STANDING]
+        for propeller in standing:
+            propeller.set_sense(0.0)
+        self.fdm.run()
+        for propeller in standing:
+            propeller.set_sense(propeller.sense)
+
+    def finite_state(self) -> list[float]:
+        """Values of the properties STATE.
+
+        Raises:
+            ParameterError: One is not finite: the aircraft tumbles, or its model has no answer there.
+        """
+        values = [read() for read in self.read]
+        if not all(map(math.isfinite, values)):
+            named = ", ".join(
+                f"{n} = {v:g}" for n, v in zip(STATE, values, strict=True) if not math.isfinite(v)
+            )
+            raise ParameterError(
+                f"{NOT_FINITE} of {self.fdm.get_model_name()} after {self.fdm.get_sim_time():g} s: {named}"
+            )
+        return values
 
     def save(self) -> SavedFlight:
         """Return the record of the flight."""

@@ -24,6 +24,7 @@ from tussle.stock.motion.jsbsim_model import kernels
 from tussle.stock.motion.jsbsim_model.fleet import Fleet, Flown
 from tussle.stock.motion.jsbsim_model.flight import (
     FOOT,
+    NOT_FINITE,
     THROTTLES,
     TRIMS,
     Aircraft,
@@ -98,6 +99,11 @@ class JSBSimAircraft(RigidBodyModel):
     flightgear_ip = Param("localhost", doc="Its address.")
     flightgear_port = Param(5600, structural=True, ge=1, le=65535, doc="Its port.")
     flightgear_protocol = Param("UDP", choices=["UDP", "TCP"], doc="Protocol.")
+    on_failure = Param(
+        "end",
+        choices=["end", "remove"],
+        doc="What becomes of an aircraft whose state is no longer finite: its world ends with an error, or it alone is removed.",
+    )
     processes = Param(
         1,
         structural=True,
@@ -233,10 +239,13 @@ class JSBSimAircraft(RigidBodyModel):
         state[3:, rows] = moving
 
     def _report(self, body: Any) -> None:
-        """End the worlds of aircraft that have failed."""
+        """End the worlds of aircraft that have failed, or remove these."""
         for row, flight in enumerate(self.flight):
             if flight is not None and flight.failure:
-                body.fail(row, flight.failure)
+                if self.on_failure == "remove" and flight.failure.startswith(NOT_FINITE):
+                    body.remove(row)
+                else:
+                    body.fail(row, flight.failure)
 
 
 def above_sea_level(latitude: np.ndarray, altitude: np.ndarray) -> np.ndarray:
