@@ -129,6 +129,26 @@ def box_triangle_contacts(items, a, t, k, motion, found, n, scratch):
 
 
 @lean_routine
+def leave_far_sides(found, n, radius):
+    """Leave out the contacts of a sphere or capsule with surfaces that it is behind, but has not entered.
+
+    A centre that is nearer to the outside of another surface that faces it is in front of a thin wall, not inside: the far side of
+    that wall would push it through.
+    """
+    for k in range(n):
+        depth = -(found[k, 9] + radius)
+        for j in range(n):
+            outside = found[j, 9] + radius
+            if (
+                depth > 0.0
+                and 0.0 <= outside < depth
+                and found[j, 10] == found[k, 10]
+                and dot(vector(found, j, 0), vector(found, k, 0)) < 0.0
+            ):
+                found[k, 9] = np.inf
+
+
+@lean_routine
 def one_by_octant(found, n, size):
     """Keep one contact of a box with one plane in each octant of the box; returns the number of contacts.
 
@@ -285,7 +305,9 @@ def find_surfaces(bodies, motion, planes, tree, field, ints, contacts):
             items, a, (low, high), (bounds, links, root, triangles, single, inner), move, found, n, stack
         )
         n = field_contacts(items, a, (low, high), (height, grid, single, inner), move, found, n)
-        if items[a, 3] == 0.0:
+        if items[a, 3] > 0.0:
+            leave_far_sides(found, n, items[a, 3])
+        else:
             n = one_by_octant(found, n, size_of(items, a))
         for k in range(n):
             if not found[k, 9] < np.inf:  # replaced by another contact

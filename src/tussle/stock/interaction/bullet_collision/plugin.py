@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from tussle.api import HistoricAttributes, Interaction, Param, State, WorldView, neighbors
-from tussle.contacts import found
+from tussle.contacts import found, held
 from tussle.contacts.solids import StaticSolids
 from tussle.errors import ParameterError
 from tussle.messages import EntityCollided, EntityHitGround
@@ -13,6 +13,8 @@ from tussle.numeric.quaternion import quat_multiply, quat_normalize
 
 MOST_FOLLOWED = 2.0
 """Largest relative motion per step for which pairs are followed, in sizes of the largest body. Beyond it all pairs would be candidates."""
+FAR = 1e9
+"""Coordinate beyond which ways are not followed [m]."""
 FAST = 1e150
 """Speed beyond which a body is not followed [m/s]: the square of a velocity would overflow."""
 
@@ -23,15 +25,17 @@ class BulletCollision(Interaction):
     A body is a sphere of its block's radius, a box where the block has one, or a capsule inside that box for the blocks in `capsules`.
     Sequential impulses (Catto 2005) at the contacts change the velocities; Coulomb friction, Newton's restitution. Bodies with an
     inertia tensor turn (motion models such as FreeBody and Multirotor); all others move without turning. A motion model that sets
-    its velocity from commands in each step, such as SingleIntegrator, is only moved out of what it overlaps.
+    its velocity from commands in each step, such as SingleIntegrator, drives into what is in its way: it is held there and slides along.
 
-    Fast spheres and capsules are followed within the step, so that they do not pass through others; a box that moves by more than
-    its own size in a step may. `EntityCollided` and `EntityHitGround` are published when a contact begins.
+    Fast bodies are followed on their straight way of the step, so that they do not pass through others and the scene, however thin;
+    of a box, the sphere or capsule along its x axis that fits inside. `EntityCollided` and `EntityHitGround` are published when a
+    contact begins.
 
     In SCRIMMAGE all bodies are spheres; a contact sets the external force to 1 N along the normal, so that a SimpleCar stops.
     """
 
     grade = "portable"
+    reads_start_positions = True
     historic_attributes = HistoricAttributes(
         unread=(
             "show_rays", "enable_ray_tracing", "publish_on_local_networks", "pcl_network_name", "pcl_topic_name",
@@ -95,6 +99,7 @@ class BulletCollision(Interaction):
     def step(self, w: WorldView) -> None:
         if not self.enable_collision_detection or not w.n:
             return
+        self._hold(w)
         items, sizes = found.place(w.pos, w.quat, w.radius, w.block, self._shapes(w))
         contacts = found.find(
             (items, sizes), self._near(w, sizes[0]), (w.vel, w.dt, w.world), self._scene(w), w.n_worlds
@@ -104,6 +109,41 @@ class BulletCollision(Interaction):
             self._respond(w, contacts, sizes, (impulses, is_new))
         touches = found.remembered(contacts, w.id, sizes, impulses, self.memory)
         self._report(w, contacts, touches, is_new)
+
+    def _hold(self, w: WorldView) -> None:
+        """Move bodies back that have moved into or through something in this step."""
+        with np.errstate(over="ignore", invalid="ignore"):  # the engine reports states that are not finite
+            x, y, z = ways = w.pos - w.start_pos
+            far = np.sqrt(x * x + y * y + z * z)
+        items, sizes = found.place(w.start_pos, w.quat, w.radius, w.block, self._shapes(w))
+        is_fast = (far > held.FAST * sizes[1]) & (np.maximum(np.abs(w.pos), np.abs(w.start_pos)) < FAR).all(
+            axis=0
+        )
+        if not is_fast.any():
+            return
+        share = np.where(is_fast & ~np.isin(w.block, self._blocks(w, "fixed")), 1.0, 0.0)
+        row, other = self._on_the_way(w, np.where(is_fast, far, 0.0), sizes[0])
+        rows = np.unique(np.concatenate([np.flatnonzero(is_fast), row, other]))
+        pairs = np.searchsorted(rows, row), np.searchsorted(rows, other)
+        shapes = np.ascontiguousarray(items[rows]), np.ascontiguousarray(sizes[:, rows])
+        made = held.held_ways(shapes, pairs, ways[:, rows], share[rows], w.world[rows], self._scene(w))
+        is_held = (made != ways[:, rows]).any(axis=0)
+        rows = rows[is_held]
+        w.move(rows, pos=w.start_pos[:, rows] + made[:, is_held])
+
+    def _on_the_way(self, w: WorldView, far: np.ndarray, size: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Rows of the pairs that may meet on ways of lengths `far` [m], (n,), one of them fast, ordered by ids, (m,) each."""
+        largest = np.zeros(w.n_worlds)
+        np.maximum.at(largest, w.world, size)
+        near = w.near(np.where(far > 0.0, 1.01 * (size + largest[w.world]) + 2.1 * far, 0.0))
+        row, other = near.row, near.other
+        is_team, world = w.team[row] == w.team[other], w.world[row]
+        counts = np.where(is_team, self.enable_team_collisions[world], self.enable_non_team_collisions[world])
+        is_first = (far[row] > far[other]) | ((far[row] == far[other]) & (w.id[row] < w.id[other]))
+        kept = np.flatnonzero(counts & is_first)
+        row, other = row[kept], other[kept]
+        order = np.lexsort((w.id[other], w.id[row], w.world[row]))
+        return row[order], other[order]
 
     def _near(self, w: WorldView, far: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Rows of the pairs that may touch, ordered by ids, (m,) each."""
