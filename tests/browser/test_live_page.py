@@ -65,6 +65,26 @@ def test_buttons_step_play_and_pause(game):
     assert live.step_number == there
 
 
+def test_frames_are_those_that_the_browser_draws_and_states_those_that_are_sent(game):
+    live, _, watched = game
+    live.seek(0.0)
+    live.settle()
+    # At most two pictures a second, whatever comes from the server.
+    watched.tab.evaluate("() => { window.drawAtOnce = window.requestAnimationFrame; "
+                         "window.requestAnimationFrame = (draw) => setTimeout(() => draw(performance.now()), 500); }")  # fmt: skip
+    watched.button("Play")
+    try:
+        watched.wait(
+            """(() => {
+                const text = document.querySelector('#subtitle').innerText;
+                const [, frames, states] = /([\\d.]+) frames\\/s · (\\d+) states\\/s sent/.exec(text) ?? [];
+                return Number(frames) > 0 && Number(frames) <= 2.25 && Number(states) > 4;
+            })()"""
+        )
+    finally:
+        watched.tab.evaluate("() => { window.requestAnimationFrame = window.drawAtOnce; }")
+
+
 def test_keys_of_a_real_keyboard(game):
     live, _, watched = game
     live.seek(0.0)

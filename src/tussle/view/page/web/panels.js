@@ -63,10 +63,14 @@ export class Panels {
     say(notice, text);
   }
 
-  /** Show the state of a live game. @param {Status} status */
-  showStatus({ step, reached, rate, seed, isPaused, isOver, isSeeking, error, notes, metrics, steers }) {
+  /**
+   * Show the state of a live game.
+   * @param {Status} status
+   * @param {number} drawRate Frames that this browser draws per second.
+   */
+  showStatus({ step, reached, rate, seed, isPaused, isOver, isSeeking, error, notes, metrics, steers }, drawRate) {
     const state = isSeeking ? 'seeking' : isOver ? 'over' : isPaused ? 'paused' : `${Number(reached.toPrecision(2))}× real time`;
-    const parts = [`seed ${seed}`, `step ${number(step)}`, state, rate && !isPaused && `${rate} frames/s`, !steers && 'another browser steers'];
+    const parts = [`seed ${seed}`, `step ${number(step)}`, state, ...(rate && !isPaused ? [`${Number(drawRate.toPrecision(2))} frames/s`, `${rate} states/s sent`] : []), !steers && 'another browser steers'];
     say(byId('subtitle'), parts.filter(Boolean).join(' · '));
     this.showNotes([...new Set([...(error ? [error] : []), ...this.page.notes, ...notes])]);
     if (error) this.notice(error, true);

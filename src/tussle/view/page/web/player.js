@@ -18,6 +18,8 @@ import { actionsOf, listenToSettings } from './actions.js';
 
 /** Longer than any game [s]. */
 const WHOLE_GAME = 1e9;
+/** Time over which drawn frames are counted [ms]. */
+const RATE_SPAN = 4000;
 /** Least time between two looks back for the trails [ms]. */
 const LOOK_PERIOD = 2000;
 /** With no more entities than this, labels and short trails are shown from the start. */
@@ -58,6 +60,8 @@ export class Player {
     this.isCalm = window.matchMedia('(prefers-reduced-motion: reduce)').matches;
     const failed = (/** @type {Error} */ error) => sorry(`The data of this page is missing or damaged: ${error.message}`);
     this.layer = source.isLive ? new Live(page, () => this.look()) : new Recorded(page, source, () => this.look(), failed);
+    /** @type {number[]} */
+    this.drawTimes = [];
     this.camera = new Camera(size);
     this.picture = new Picture(this);
     this.viewpoint = new Viewpoint(this);
@@ -125,7 +129,7 @@ export class Player {
 
   /** @param {Status} status */
   takeStatus(status) {
-    if (!this.isLost) this.panels.showStatus(status);
+    if (!this.isLost) this.panels.showStatus(status, this.drawRate);
     if (status.refusal) this.say(status.refusal);
     this.look();
   }
@@ -206,8 +210,16 @@ export class Player {
     requestAnimationFrame((next) => this.tick(next));
   }
 
+  /** Frames drawn per second, over the last seconds. */
+  get drawRate() {
+    const now = performance.now();
+    this.drawTimes = this.drawTimes.filter((time) => now - time < RATE_SPAN);
+    return this.drawTimes.length / (RATE_SPAN / 1000);
+  }
+
   draw() {
     const { clock, layer } = this;
+    this.drawTimes.push(performance.now());
     const shapes = layer instanceof Recorded ? layer.shapesShown() : null;
     if (shapes && shapes !== this.shapes) {
       this.shapes = shapes;
