@@ -158,7 +158,7 @@ class PluginOptions:
 
 @dataclass(frozen=True, kw_only=True)
 class MissionOptions(PluginOptions):
-    """Check a mission, or all of a folder: read it, build its game, report all errors. Check a run or batch directory: report all damage."""
+    """Check a mission, or all of a folder: read it, build its game, report all errors. Check a run or batch: report all damage."""
 
     mission: Annotated[
         str,
