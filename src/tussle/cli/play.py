@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from tussle import stock
+from tussle import documents, stock
 from tussle.cli.interrupt import Interrupt
 from tussle.cli.options import MissionOptions
 from tussle.cli.play_options import ConvertOptions, RunOptions
@@ -134,8 +134,10 @@ def state_of(options: MissionOptions) -> tuple[str, str]:
 
 def is_mission(path: Path) -> bool:
     """Return whether a file seems to be a mission, by its beginning."""
-    with path.open("rb") as file:
-        return b"<runscript" in file.read(SEARCHED)
+    try:
+        return b"<runscript" in documents.read_bytes(path, MissionError)[:SEARCHED]
+    except MissionError:  # no regular file, or one that is too large
+        return False
 
 
 def awaited(mission: Mission) -> list[str]:

@@ -13,7 +13,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple, Self
 
-from tussle import units
+from tussle import documents, units
 from tussle.errors import MissingFileError, ParameterError, nearest_name
 from tussle.geodesy import Origin
 
@@ -68,7 +68,7 @@ STANDING = 1.0
 """Speed of a propeller that stands [1/min], as JSBSim has it; a wind turns it."""
 
 
-class Propeller(NamedTuple):
+class PropellerNodes(NamedTuple):
     """A propeller of an aircraft.
 
     Attributes:
@@ -107,7 +107,7 @@ class JSBSimFlight:
         ]
         self.read = [nodes(name, True).get_double_value for name in STATE]
         self.propellers = [
-            Propeller(rpm.get_double_value, sense.set_double_value, sense.get_double_value())
+            PropellerNodes(rpm.get_double_value, sense.set_double_value, sense.get_double_value())
             for i in range(n_engines)
             if (rpm := nodes(f"propulsion/engine[{i}]/propeller-rpm", False))
             and (sense := nodes(f"propulsion/engine[{i}]/propeller-sense", False))
@@ -231,7 +231,7 @@ def root_of(file: Path, name: str) -> Path:
     root = file.parents[len(parts) - 1]
     if file.parts[-len(parts) :] != parts:
         raise MissingFileError(f"{file} is not in a folder {Path(*parts[:-1])}, where JSBSim reads it")
-    used = USE.search(file.read_text(encoding="utf-8", errors="replace"))
+    used = USE.search(documents.read_text(file, ParameterError))
     if used is not None and not (root / "aircraft" / used[1] / f"{used[1]}.xml").is_file():
         raise MissingFileError(f"{file} uses the aircraft {used[1]!r}, which is not in {root / 'aircraft'}")
     return root
