@@ -48,15 +48,15 @@ def swept_pairs(ways, limit, enabled, rows, arrays, pairs):
     table = table_of(arrays)
     first, second = pairs
     n = limit.shape[0]
-    found = np.empty(n, np.int64)
+    places = np.empty(n, np.int64)
     n_pairs = np.int64(0)
     for i in range(n):
         reach = limit[i] + (2.0 + 1e-9) * far[i]
         m = in_range(
-            world[i], place[i], pos[0, i], pos[1, i], pos[2, i], reach, ANY, 0.0, table, found, np.int64(0)
+            world[i], place[i], pos[0, i], pos[1, i], pos[2, i], reach, ANY, 0.0, table, places, np.int64(0)
         )
         for k in range(m):
-            j = order[found[k]]
+            j = order[places[k]]
             if far[j] > far[i] or (far[j] == far[i] and ids[j] < ids[i]):
                 continue
             if not (mates[i] if team[i] == team[j] else strangers[i]):
