@@ -1,6 +1,6 @@
 """The experiment of the paper: wins in 1,000 games, compared with the code of the paper.
 
-    python benchmarks/validity.py [--update sequential|synchronous] [--law historic|corrected] [--seeds 1000] [--processes 2]
+    python benchmarks/validity.py [--update sequential|synchronous|random|random_in_blocks] [--law historic|corrected] [--seeds 1000] [--processes 2]
                                   [--csv FILE] [--reference FILE] [--json FILE]
     python benchmarks/validity.py --compat [--seeds 200] [--reference FILE]
 
@@ -59,7 +59,11 @@ def mission(update: str, law: str) -> Mission:
 def play(job: tuple[str, str, list[int]]) -> list[tuple[int, int, int, int, float]]:
     """(seed, score of team 2, score of team 3, prey left, end time) of each seed."""
     update, law, seeds = job
-    results = Simulation(mission(update, law), seeds=seeds).run()
+    game = mission(update, law)
+    size = 1 if update.startswith("random") else len(seeds)  # these take one world at a time
+    results = [
+        r for i in range(0, len(seeds), size) for r in Simulation(game, seeds=seeds[i : i + size]).run()
+    ]
     return [(r.seed, int(r.scores[2]), int(r.scores[3]), r.alive[1], r.t) for r in results]
 
 
@@ -121,7 +125,9 @@ def compare(ours: np.ndarray, theirs: np.ndarray) -> list[dict[str, Any]]:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--update", choices=("sequential", "synchronous"), default="sequential")
+    parser.add_argument(
+        "--update", choices=("sequential", "synchronous", "random", "random_in_blocks"), default="sequential"
+    )
     parser.add_argument("--law", choices=("historic", "corrected"), default="historic")
     parser.add_argument("--compat", action="store_true", help="play by the laws of SCRIMMAGE of 2025")
     parser.add_argument("--seeds", type=int, default=1000)
@@ -132,7 +138,8 @@ def main() -> None:
     if args.compat:
         args.update, args.law = "synchronous", "scrimmage"
     seeds = list(range(1, args.seeds + 1))
-    jobs = [(args.update, args.law, seeds[i : i + STACK]) for i in range(0, len(seeds), STACK)]
+    size = 5 if args.update.startswith("random") else STACK
+    jobs = [(args.update, args.law, seeds[i : i + size]) for i in range(0, len(seeds), size)]
     begin = time.perf_counter()
     with multiprocessing.get_context("spawn").Pool(args.processes) as pool:
         rows = [row for part in pool.imap(play, jobs) for row in part]

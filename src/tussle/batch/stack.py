@@ -17,6 +17,7 @@ from tussle.engine.result import WorldResult
 from tussle.engine.simulation import Simulation
 from tussle.errors import PluginError, TussleError
 from tussle.mission import Mission
+from tussle.mission.spec import ONE_BY_ONE, SHUFFLED
 
 ROWS = 8192
 """Entities of a stack, about: with more rows a row costs no less, and the cache overflows."""
@@ -33,14 +34,15 @@ Take = Callable[[int], Sequence[BatchRun]]
 def stack_size(mission: Mission) -> int:
     """Best number of worlds of a mission in a stack."""
     n = max(1, sum(block.count for block in mission.blocks))
-    rows = SEQUENTIAL_ROWS if mission.update == "sequential" else ROWS
+    rows = SEQUENTIAL_ROWS if mission.update in ONE_BY_ONE else ROWS
     return max(1, min(MOST, rows // n, most_worlds(mission)))
 
 
 def most_worlds(mission: Mission) -> int:
     """The largest stack that all plugins of a mission allow."""
     plugins: list[Plugin] = [*mission.world_plugins, *(p for block in mission.blocks for p in block.plugins)]
-    return min([MOST, *(Handle.most_worlds(p) or MOST for p in plugins)])
+    one = [1] if mission.update in SHUFFLED else []
+    return min([MOST, *one, *(Handle.most_worlds(p) or MOST for p in plugins)])
 
 
 def play(mission: Mission, take: Take, size: int) -> Iterator[Finished | Heartbeat]:

@@ -174,7 +174,7 @@ class Births:
         n_own = sum(b.count for b in mission.blocks)
         n_to_come = self.n_left.sum(axis=0)
         space = max(mission.limits.rows, n_own) - n_alive - n_to_come
-        if mission.update == "sequential":  # groups and calls are kept after their entities are gone
+        if mission.update != "synchronous":  # groups and calls are kept after their entities are gone
             space = np.minimum(space, max(mission.limits.sequential, n_own) - self.next_id + 1 - n_to_come)
         return np.asarray(space)
 

@@ -22,6 +22,7 @@ from tussle.engine.table import span
 from tussle.errors import PluginError
 from tussle.lists import RaggedColumn
 from tussle.mission import Block
+from tussle.mission.spec import ONE_BY_ONE
 from tussle.scene import Scene
 
 Params = list[tuple[int, Binding, str, Any]]
@@ -78,7 +79,7 @@ class Population:
         self.context = context
         self.overrides = overrides
         self.advise = advise
-        self.is_sequential = overrides.mission.update == "sequential"
+        self.is_sequential = overrides.mission.update in ONE_BY_ONE
         self.bodies = Bodies.empty(0, overrides.n_worlds)
         self.bodies.scans = self.is_sequential
         self.groups: list[Group] = []

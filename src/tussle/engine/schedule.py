@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from tussle import rng
 from tussle.api.kinds import WorldPlugin
 from tussle.columns import Subscribe
 from tussle.engine import failure
@@ -23,6 +24,10 @@ from tussle.engine.subset import call_group, call_world_plugin
 from tussle.engine.world_bindings import WorldBinding
 from tussle.errors import PluginError
 from tussle.mission.cadence import Cadence, TimerCadence
+from tussle.mission.spec import SHUFFLED
+from tussle.rng import stream_key
+
+ORDER = int(stream_key("update", "order"))
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,13 +51,18 @@ def compose(state: SimulationState) -> list[Call]:
     groups, bodies = state.population.groups, state.population.bodies
     if any(r.plugin.reads_start_positions for r in state.world_bindings):
         calls.append(Call("keep positions", partial(_keep_positions, state)))
-    if state.mission.update == "sequential":
+    if state.population.is_sequential:
         # As in the paper's code, which indexes the positions once per step: an entity that has moved is seen where it is by those in
         # whose range it was at the start of the step.
         calls.append(Call("index start positions", bodies.keep_start))
+        turns = []
         for group in groups:
-            calls += [_entity_call(state, "autonomy", group, b) for b in group.autonomies]
-            calls += _motion(state, [group])
+            decides = [_entity_call(state, "autonomy", group, b) for b in group.autonomies]
+            turns.append((group, [*decides, *_motion(state, [group])]))
+        if state.mission.update in SHUFFLED:
+            calls.append(Call("each entity in random order", partial(_take_turns, state, turns)))
+        else:
+            calls += [call for _, own in turns for call in own]
         calls.append(Call("index current positions", bodies.end_start))
     else:
         for group in groups:
@@ -73,6 +83,18 @@ def compose(state: SimulationState) -> list[Call]:
     calls.append(Call("deliver messages", partial(deliver, state)))
     calls.append(Call("check, remove, end", partial(end_step, state)))
     return calls
+
+
+def _take_turns(state: SimulationState, turns: list[tuple[Group, list[Call]]]) -> None:
+    """Let the entities of the only world decide and move in an order that is drawn by its seed and step."""
+    places = np.array([group.place for group, _ in turns], np.int64)
+    chance = rng.uniform(state.context.keys[:1], ORDER, places, state.context.clock.step[:1])[0]
+    in_blocks = state.mission.update == "random_in_blocks"
+    names = state.context.block_names
+    block = np.array([names.index(group.names[0]) if in_blocks else 0 for group, _ in turns], np.int64)
+    for k in np.lexsort((places, chance, block)):
+        for call in turns[k][1]:
+            call.run()
 
 
 def _keep_positions(state: SimulationState) -> None:
@@ -140,7 +162,7 @@ def _steering_call(state: SimulationState, steering: Steering, dt: float, subste
             except Exception as error:
                 raise failure.in_call(error, plugin, view, group) from error
 
-    place = f" {group.place}" if state.mission.update == "sequential" else ""
+    place = f" {group.place}" if state.population.is_sequential else ""
     names = ", ".join(b.spec.instance_name for b in (*group.controllers, group.motion))
     return Call(f"{'control, move':<12} {group.name}{place}: {names}, {substeps} substeps in one", run)
 
@@ -257,7 +279,7 @@ def _world_call(state: SimulationState, kind: str, world_binding: WorldBinding) 
 def _label(state: SimulationState, kind: str, group: Group, binding: Binding, substep: int = 0) -> str:
     m = state.mission.motion_multiplier
     part = f" ({substep + 1}/{m})" if kind == "controller" and m > 1 else ""
-    place = f" {group.place}" if state.mission.update == "sequential" else ""
+    place = f" {group.place}" if state.population.is_sequential else ""
     return f"{kind:<12} {group.name}{place}: {binding.spec.instance_name}{_rate_text(binding.spec)}{part}"
 
 

@@ -25,6 +25,7 @@ from tussle.engine.step_end import remove_dead, world_result
 from tussle.errors import MissionError, ParameterError, PluginError
 from tussle.messages import Message, Messages
 from tussle.mission import GivenMission, Mission, mission_of
+from tussle.mission.spec import SHUFFLED
 
 if TYPE_CHECKING:
     from tussle.record import FirstStates
@@ -100,6 +101,10 @@ class Simulation:
             raise MissionError(f"mission: reseed = {mission.reseed!r} needs a reseed_time")
         if on_error not in (None, "raise", "record"):
             raise ParameterError(f"on_error = {on_error!r} is not allowed; it is 'raise' or 'record'")
+        if mission.update in SHUFFLED and len(seeds) > 1:
+            raise MissionError(
+                f"update={mission.update!r} takes one world at a time, not a stack of {len(seeds)}"
+            )
         for plugin in [*mission.world_plugins, *(p for b in mission.blocks for p in b.plugins)]:
             most = Handle.most_worlds(plugin)
             if most is not None and len(seeds) > most:

@@ -18,7 +18,8 @@ class Limits:
         files: Files that one mission includes.
         include_depth: Nesting of includes.
         rows: Entities of all blocks together, unborn ones included; while running, entities of one world.
-        sequential: The same with update="sequential", where each entity needs its own calls and columns, even after its removal.
+        sequential: The same where entities move one after another: each entity needs its own calls and columns, even after its
+            removal.
         tries: Positions redrawn for the entities of one world that are born at the same time, where interactions reject them.
         substeps: motion_multiplier.
         steps: Steps until the end; so many that a game of SCRIMMAGE that ends by itself or by Ctrl-C may name any end.
@@ -47,4 +48,4 @@ class Limits:
 
     def most_rows(self, update: str) -> int:
         """Maximum number of entities of a mission with this `update`."""
-        return self.sequential if update == "sequential" else self.rows
+        return self.rows if update == "synchronous" else self.sequential

@@ -31,7 +31,11 @@ RUN = "run"
 OF_BLOCK = ("autonomy", "controller", "motion", "sensor")
 OF_WORLD = ("interactions", "metrics", "networks")
 """Names of the plugins of a block, and of a mission."""
-UPDATES = ("synchronous", "sequential")
+UPDATES = ("synchronous", "sequential", "random", "random_in_blocks")
+ONE_BY_ONE = UPDATES[1:]
+"""Those in which entities decide and move one after another."""
+SHUFFLED = UPDATES[2:]
+"""Those with another order of the entities in each step, which take one world at a time."""
 PLACEMENTS = ("normal", "uniform")
 WITHOUT_SPACE = ("wait", "fail")
 
@@ -268,7 +272,9 @@ class Mission:
         start: Time of step 0 [s].
         motion_multiplier: Substeps of controllers and motion per step.
         update: "synchronous": all entities decide on the states at the start of the step. "sequential": the entities decide and
-            move one after another, in order of id; the positions at the start of the step decide who is in range of whom.
+            move one after another, in order of id; the positions at the start of the step decide who is in range of whom. "random":
+            the same in an order that is drawn anew in each step; "random_in_blocks": drawn within each block, block after block.
+            These two take one world at a time, not a stack.
         end_conditions: Conditions that end a world, of time, one_team, all_dead, none.
         interactions: Interaction plugins, in order.
         metrics: Metric plugins, in order.

@@ -54,7 +54,8 @@ RUN = {
     "motion_multiplier": TagSpec("Substeps of controllers and motion per step.", "1", reads="whole"),
     "update": TagSpec(
         "`synchronous`: all entities decide on the states at the start of the step; `sequential`: the entities decide and move one "
-        "after another (addition to the format).",
+        "after another; `random`: the same in another random order in each step; `random_in_blocks`: in random order within each block "
+        "(addition to the format).",
         "synchronous",
         reads="text",
     ),

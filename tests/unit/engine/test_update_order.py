@@ -8,6 +8,8 @@ from small_worlds import VELOCITY, Drift, block, mission
 
 from tussle import Simulation
 from tussle.api import Autonomy, EasyAutonomy, Interaction, Output, Param, State, neighbors
+from tussle.batch.stack import stack_size
+from tussle.errors import MissionError
 
 
 class Follow(Autonomy):
@@ -70,6 +72,75 @@ def test_what_a_follower_sees(update, leader_first, seen, follow):
         found.append(float(sim.read(f"follower.{follow.__name__}.seen")[0][0, 0]))
         assert sim.read("follower.pos")[0][0, 0, 0] == pytest.approx(found[-1])
     assert found == pytest.approx(seen)
+
+
+CALLS = []
+
+
+class Tell(Autonomy):
+    """Tells that it decides."""
+
+    velocity = Output(VELOCITY, unit="m/s")
+
+    def step(self, g):
+        CALLS.extend(g.id.tolist())
+
+
+def orders(update, seed, steps=200, count=3):
+    """The ids of all entities, step by step in the order in which they decide, (steps, n)."""
+    CALLS.clear()
+    a, b = (block(name, count=count, autonomy=Tell(), variance=(9.0, 9.0, 9.0)) for name in "ab")
+    sim = Simulation(mission(a, b, update=update, end=1e3), seeds=seed)
+    sim.step(steps)
+    return np.array(CALLS).reshape(steps, 2 * count)
+
+
+def test_each_step_has_its_own_random_order():
+    found = orders("random", 1)
+    assert (np.sort(found, axis=1) == np.arange(1, 7)).all()
+    assert len(np.unique(found, axis=0)) > 150  # of 720
+    first = np.bincount(found[:, 0], minlength=7)[1:]
+    assert (np.abs(first - 200 / 6) < 5.0 * np.sqrt(200 * 5 / 36)).all()
+    assert (orders("random", 1) == found).all()
+    assert (orders("random", 2) != found).any()
+
+
+def test_the_order_may_be_random_within_blocks():
+    found = orders("random_in_blocks", 1)
+    assert (np.sort(found[:, :3], axis=1) == [1, 2, 3]).all()
+    assert (np.sort(found[:, 3:], axis=1) == [4, 5, 6]).all()
+    assert len(np.unique(found, axis=0)) == 36
+
+
+def test_in_a_random_order_a_follower_sees_what_has_moved_and_what_has_not():
+    game = pair("random", True, Follow).replace(end=20.0)
+    sim = Simulation(game)
+    ahead = []
+    while not sim.is_over:
+        before = float(sim.read("runner.pos")[0][0, 0, 0])
+        sim.step()
+        ahead.append(round(float(sim.read("follower.Follow.seen")[0][0, 0]) - before, 6))
+    assert set(ahead) == {0.0, 3.0}
+    assert 60 < ahead.count(3.0) < 140
+
+
+def test_a_random_order_goes_on_after_a_restore_and_a_reset():
+    walkers = block("a", count=5, autonomy=NearFollow(), variance=(90.0, 90.0, 90.0))
+    sim = Simulation(mission(walkers, update="random", end=4.0), seeds=5)
+    sim.step(13)
+    saved = sim.snapshot()
+    (whole,) = sim.run()
+    for begin in (lambda: sim.restore(saved), lambda: sim.reset([0])):
+        begin()
+        (again,) = sim.run()
+        assert again.state_hash == whole.state_hash
+
+
+def test_a_random_order_takes_one_world_and_batches_give_it_one():
+    game = mission(block("a", count=2, autonomy=Tell()), update="random", end=1.0)
+    with pytest.raises(MissionError, match="update='random' takes one world at a time, not a stack of 2"):
+        Simulation(game, seeds=[1, 2])
+    assert stack_size(game) == 1
 
 
 class InRange(Autonomy):
