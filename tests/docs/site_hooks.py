@@ -68,6 +68,7 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
         seen.add(path)
         if path.endswith(".md"):
             waiting += [target(path, link) for link in LINK.findall(FENCE.sub("", (ROOT / path).read_text()))]
+        waiting += files_in(path)
         if not path.startswith("docs/"):
             files.append(File.generated(config, site_path(path), content=shown(path)))
     return files
@@ -119,9 +120,18 @@ def shown(path: str) -> str | bytes:
         return linked(path, file.read_text())
     head = f"---\nsearch:\n  exclude: true\n---\n\n# `{path}`\n\n"
     if file.is_dir():
-        return head + "".join(f"- `{each.relative_to(file)}`\n" for each in sorted(file.rglob("*.*")))
+        names = (posixpath.relpath(each, path) for each in files_in(path))
+        return linked(path, head + "".join(f"- [{name}]({file.name}/{name})\n" for name in names))
     language = file.suffix[1:] if file.suffix in (".py", ".xml", ".cpp") else "text"
     return f"{head}`````{language}\n{file.read_text()}\n`````\n"
+
+
+def files_in(path: str) -> list[str]:
+    """Paths in the repository of the files in a folder and its folders; none if the path is that of a file."""
+    found = (
+        each for each in (ROOT / path).rglob("*.*") if each.is_file() and "__pycache__" not in each.parts
+    )
+    return sorted(each.relative_to(ROOT).as_posix() for each in found)
 
 
 def module_index() -> str:

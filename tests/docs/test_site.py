@@ -73,6 +73,7 @@ def test_parameters_have_types_and_attributes_units(built_site):
 @pytest.mark.needs("mkdocs")
 def test_files_outside_the_documents_have_pages(built_site):
     assert "class SharingChaser" in shown(built_site, "files/examples/02_your_own_chaser.py")
+    assert 'href="02_your_own_chaser.py/"' in (built_site / "files/examples/index.html").read_text()
     assert 'href="../../write-a-plugin/"' in (built_site / "files/CONTRIBUTING/index.html").read_text()
 
 
