@@ -1,6 +1,7 @@
 """The experiment of the paper: wins in 1,000 games, compared with the code of the paper.
 
-    python benchmarks/validity.py [--update sequential|synchronous|random|random_in_blocks] [--law historic|corrected] [--seeds 1000] [--processes 2]
+    python benchmarks/validity.py [--update sequential|synchronous|random|random_in_blocks] [--law historic|corrected]
+                                  [--seeds 1000] [--processes 2]
                                   [--csv FILE] [--reference FILE] [--json FILE]
     python benchmarks/validity.py --compat [--seeds 200] [--reference FILE]
 

@@ -51,13 +51,12 @@ class Ground(Interaction):
         self._carry(w, np.where(removes, np.inf, height))
 
     def _carry(self, w: WorldView, height: np.ndarray) -> None:
-        """Push the entities on the ground, and those that would pass it.
+        """Push the entities on the ground, and those that would pass it. By default it does nothing.
 
         Args:
             w: The view.
             height: Height of each entity above the ground [m], (n,); inf for those that it does not push.
         """
-        raise NotImplementedError
 
     def _level(self, w: WorldView) -> np.ndarray:
         """Return the ground level [m], (n_worlds,)."""
