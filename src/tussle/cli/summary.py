@@ -54,7 +54,8 @@ def show_summary(simulation: Simulation, name: str, speed: Speed, directory: Pat
     """Print the result of world 0 of a simulation."""
     result, mission = simulation.result()[0], simulation.mission
     n = sum(block.count for block in mission.blocks)
-    facts = f"seed {result.seed} · {n} entities · {result.steps} steps of {mission.dt:g} s"
+    entities, steps = "entity" if n == 1 else "entities", "step" if result.steps == 1 else "steps"
+    facts = f"seed {result.seed} · {n} {entities} · {result.steps} {steps} of {mission.dt:g} s"
     networks = [network.instance_name for network in mission.networks]
     of_world = (
         (plugin, f"{key} {_number(value)}")
