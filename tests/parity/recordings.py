@@ -95,6 +95,7 @@ NAMES = (
     "harmonic-oscillator",
     "waypoint_follower",
     "batch-example-mission",
+    "cars",
 )
 """Missions whose plugins all exist here."""
 
