@@ -451,6 +451,7 @@ class Children(Column):
         by_state: They may have `states`, in which they act (see `tussle.api.StateFollower`).
         shares_channels: Their channels are those of the entity; otherwise they are private to the outer plugin.
         fields: Text parameters of `kind`, if a mission file gives each plugin as a row of their values: `[ a b ] [ c d ]`.
+        default: The plugins of an outer plugin for which none are given; an empty list is given, too.
         doc: One-line description.
     """
 
@@ -460,10 +461,12 @@ class Children(Column):
         by_state: bool = False,
         shares_channels: bool = False,
         fields: str = "",
+        default: Iterable[Any] = (),
         doc: str = "",
     ) -> None:
         super().__init__(doc=doc)
         self.kind, self.by_state, self.shares_channels = kind, by_state, shares_channels
+        self.default = tuple(default)
         self.fields = _fields(fields, "Children")
 
 

@@ -96,6 +96,7 @@ NAMES = (
     "waypoint_follower",
     "batch-example-mission",
     "uuv-ex1",
+    "cars",
 )
 """Missions whose plugins all exist here."""
 

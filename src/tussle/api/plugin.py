@@ -163,7 +163,7 @@ class Plugin:
                 )
         resolved = {k: c.convert(values[k]) if k in values else c.default for k, c in params.items()}
         for key, child in children.items():
-            resolved[key] = tuple(values.get(key, ()))
+            resolved[key] = tuple(values.get(key, child.default))
             for plugin in resolved[key]:
                 if not isinstance(plugin, child.kind):
                     raise ParameterError(f"{cls.__name__}.{key}: {plugin!r} is no {child.kind.__name__}")
@@ -183,7 +183,11 @@ class Plugin:
                     )
         words = states.replace(",", " ").split() if isinstance(states, str) else (states or ())
         self.__dict__.update(
-            _values=resolved, instance_name=name or cls.__name__, rate=rate, active_in=tuple(words)
+            _values=resolved,
+            _stated=frozenset(values),
+            instance_name=name or cls.__name__,
+            rate=rate,
+            active_in=tuple(words),
         )
         self.check_values()
 
@@ -244,10 +248,15 @@ class Plugin:
         """Parameters and children by name, in SI units."""
         return dict(self.__dict__["_values"])
 
+    @property
+    def stated(self) -> dict[str, Any]:
+        """Parameters and children that were given, also those equal to their defaults; the others change with the plugin's laws."""
+        return {k: v for k, v in self.__dict__["_values"].items() if k in self.__dict__["_stated"]}
+
     def replace(self, **values: Any) -> Self:
         """Copy the plugin with other parameters."""
         merged = {
-            **self.values,
+            **self.stated,
             "name": self.__dict__["instance_name"],
             "rate": self.__dict__["rate"],
             "states": self.__dict__["active_in"],
@@ -294,10 +303,10 @@ class Plugin:
         return own["instance_name"], own["rate"], own["active_in"]
 
     def given(self) -> Iterator[tuple[str, Any]]:
-        """Yield names and values of the parameters that differ from their defaults, and the plugins inside this one by name."""
+        """Yield names and values of the parameters, and of the lists of plugins, that differ from their defaults."""
         values = self.__dict__["_values"]
         yield from ((k, values[k]) for k, c in self.params().items() if values[k] != c.default)
-        yield from ((k, list(values[k])) for k in self.children() if values[k])
+        yield from ((k, list(values[k])) for k, c in self.children().items() if values[k] != c.default)
 
     def __repr__(self) -> str:
         own = self.__dict__

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from tussle.numeric.elementary import wrap
+from tussle.historic.angles import angle_pi
 from tussle.numeric.kernel import device
 
 SHORTEST = 1e-9
@@ -30,8 +30,8 @@ def pid_loop(error: Any, gains: Any, memory: Any, dt: Any) -> Any:
 
 @device
 def pid_angle_loop(error: Any, gains: Any, memory: Any, dt: Any) -> Any:
-    """Like `pid_loop`, for an angle [rad]: the error is wrapped to (-pi, pi], its difference is not."""
-    return pid_loop(wrap(error), gains, memory, dt)
+    """Like `pid_loop`, for an angle [rad]: the error is wrapped to (-pi, pi] by `angle_pi`, its difference is not."""
+    return pid_loop(angle_pi(error), gains, memory, dt)
 
 
 @device

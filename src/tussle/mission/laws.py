@@ -49,14 +49,17 @@ def with_laws(owner: Any, names: Iterable[str]) -> dict[str, Any]:
 
 
 def with_law(plugin: Plugin) -> Plugin:
-    """Return the plugin with SCRIMMAGE's law if it is a stock plugin whose law differs. The plugins inside it are replaced likewise."""
+    """Return the plugin with SCRIMMAGE's law and defaults if it is a stock plugin whose law differs.
+
+    The plugins inside it are replaced likewise.
+    """
     from tussle import historic
 
-    cls, values = type(plugin), plugin.values
-    values |= {name: tuple(map(with_law, values[name])) for name in plugin.children()}
+    cls, values = type(plugin), plugin.stated
+    values |= {name: tuple(map(with_law, values[name])) for name in plugin.children() if name in values}
     name = cls.__name__
     if name in historic.manifest() and name in stock.manifest() and cls is stock.load(name):
         cls = historic.load(name)
-    if cls is type(plugin) and values == plugin.values:
+    if cls is type(plugin) and values == plugin.stated:
         return plugin
     return cls(name=plugin.instance_name, rate=plugin.rate, states=plugin.active_in, **values)

@@ -116,10 +116,11 @@ def boxes(*others, **values):
 
 
 def test_the_camera_without_noise_puts_boxes_on_true_centres():
-    sure = {"false_negative_probability": 0.0, "false_positive_probability": 0.0}
-    camera = still("c", sensor=ContactBlobCameraNoNoise(**sure))
+    camera = still("c", sensor=ContactBlobCameraNoNoise())
     sim = after(Mission(blocks=[camera, still("o", (60.0, 0.0, 0.0))]))
-    _, u, v, _, _ = sim.read("c.ContactBlobCameraNoNoise.blobs")[0][0, 0][:, 0]
+    blobs = sim.read("c.ContactBlobCameraNoNoise.blobs")[0][0, 0]
+    assert blobs.shape[1] == 1
+    _, u, v, _, _ = blobs[:, 0]
     assert (u, v) == pytest.approx((400.0, 300.0))
 
 

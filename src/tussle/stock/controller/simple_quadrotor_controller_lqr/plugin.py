@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from tussle.api import Controller, Input, Output, Param, State, row_law
+from tussle.api import Controller, HistoricAttributes, Input, Output, Param, State, row_law
 from tussle.numeric import sincos, wrap
 from tussle.numeric.pid import pid_loop
 
@@ -26,6 +26,7 @@ class SimpleQuadrotorControllerLQR(Controller):
     """
 
     grade = "portable"
+    historic_attributes = HistoricAttributes(renamed={"i_lim": "vel_i_lim"})
     vel_p_gain = Param(1.0, unit="1/s", doc="Velocity error to acceleration.")
     vel_i_gain = Param(0.0, unit="1/s^2", doc="Its integral to acceleration.")
     vel_d_gain = Param(0.0, doc="Its derivative to acceleration.")

@@ -273,6 +273,9 @@ class JSBSimControl(JSBSimAircraft):
         ParameterError: JSBSim is not installed, or cannot load or trim the aircraft.
     """
 
+    historic_attributes = HistoricAttributes(
+        unread=tuple(f"{axis}_{gain}" for axis in ("roll", "pitch", "yaw") for gain in ("kp", "ki", "kd"))
+    )
     commanded = (THROTTLES, "fcs/elevator-cmd-norm", "fcs/aileron-cmd-norm", "fcs/rudder-cmd-norm")
     throttle = Input(doc="Throttle.")
     elevator = Input(doc="Elevator, nose down positive.")

@@ -148,7 +148,16 @@ def _turned(slope: np.ndarray, tangent: np.ndarray, beyond: float) -> np.ndarray
 
 
 class ContactBlobCameraNoNoise(ContactBlobCamera):
-    """ContactBlobCamera with exact centres of the boxes; it misses entities and has false positives as that one does."""
+    """ContactBlobCamera with exact centres of the boxes, which misses no entity and has no false positives."""
 
+    false_negative_probability = Param(
+        0.0, ge=0.0, le=1.0, doc="Probability that an entity in view is missed."
+    )
+    false_positive_probability = Param(
+        0.0, ge=0.0, le=1.0, doc="Probability of each possible false positive."
+    )
+    max_false_positives_per_frame = Param(
+        0, ge=0, le=1000, structural=True, doc="Number of possible false positives."
+    )
     pos_noise_0 = Param((0.0, 0.0), fields=PAIR, doc="Error of u: mean and standard deviation [pixel].")
     pos_noise_1 = Param((0.0, 0.0), fields=PAIR, doc="Error of v [pixel].")

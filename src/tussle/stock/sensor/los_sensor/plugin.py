@@ -19,7 +19,7 @@ class LOSSensor(Sensor):
     with standard deviation `range_sd_min` + `range_sd_per_unit` * range, and with `probability_of_error` another one of `error_sd`.
 
     In SCRIMMAGE `oor_return` is 150 m, and the range where the ground is too near. It uses the limits only if `probability_oor_error`
-    is not 0, and does not repeat its draws. `use_flat_earth` is true there by its file, which spells it otherwise.
+    is not 0, does not repeat its draws, and sees the scene unless `use_flat_earth` is true.
     """
 
     grade = "portable"
