@@ -32,7 +32,7 @@ def mission(motion_multiplier: int = 12, end: float = 500.0, **changes: Any) -> 
             half_width=(500, 500, 100),
             heading="180 deg",
             autonomy=Predator(max_speed=35.0, allow_prey_switching=switching),
-            motion=Unicycle(vel_max=35.0, turn_rate_max=2.0, pitch_rate_max=1.5),
+            motion=Unicycle(vel_max=35.0, turn_rate_max=2.0, pitch_rate_max=1.5, use_pitch=True),
         )
 
     prey = Block(
@@ -43,7 +43,7 @@ def mission(motion_multiplier: int = 12, end: float = 500.0, **changes: Any) -> 
         placement="uniform",
         half_width=(200, 200, 100),
         autonomy=Boids(),
-        motion=Unicycle(vel_max=30.0),
+        motion=Unicycle(vel_max=30.0, use_pitch=True),
     )
     return Mission(
         blocks=[prey, predators("keepers", 2, -1000, False), predators("switchers", 3, 1000, True)],

@@ -65,6 +65,8 @@ def test_world_alone_and_a_pickled_mission_in_a_stack_of_sixteen(name):
         agree(name, STACK, hashes_now(sim))
 
 
+# Of seed 2, a vehicle of Unicycle3D begins inside its turning circle about a waypoint.
+@pytest.mark.filterwarnings("ignore:GoTo. an entity skips a waypoint:RuntimeWarning")
 @pytest.mark.parametrize("kind", sorted({name.partition("/")[0] for name in examples()}))
 def test_examples_alone_and_second_in_a_stack_of_two(kind):
     names = [name for name in examples() if name.startswith(f"{kind}/")]

@@ -25,6 +25,7 @@ MAX_GROUPS = 500
 KEY = "checksums"
 """Name of the metadata entry with the end and CRC-32 of each row group, then the checksum of the footer."""
 _ENTRY = re.compile(rb"groups:((?:[0-9a-f]{24},)*) " + re.escape(MARK) + rb"([0-9a-f]{8})")
+_RESTS = re.compile(rb"groups:[0-9a-f]{24}|" + re.escape(MARK))
 
 
 class _Sink:
@@ -94,8 +95,11 @@ def intact_groups(file: BinaryIO, size: int) -> tuple[list[int], int] | None:
     """
     tail_start = max(0, size - MOST_FOOTER)
     file.seek(tail_start)
-    found = list(_ENTRY.finditer(file.read(MOST_FOOTER)))
+    tail = file.read(MOST_FOOTER)
+    found = list(_ENTRY.finditer(tail))
     if not found:
+        if _RESTS.search(tail):  # of an entry in which a byte is wrong
+            raise ValueError("its footer is damaged")
         return None
     entries = [entry for entry in found[-1][1].decode().split(",") if entry]
     ends = [0, *(int(entry[:16], 16) for entry in entries)]

@@ -24,6 +24,7 @@ BOUND = frozenset(
     {
         "link_counts",
         "_values",
+        "_stated",
         "instance_name",
         "rate",
         "active_in",

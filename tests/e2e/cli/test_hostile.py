@@ -25,7 +25,7 @@ BILLION_LAUGHS = "<!DOCTYPE x [" + '<!ENTITY a0 "ha">' + "".join(
 ) + "]>"  # fmt: skip
 
 CASES = {
-    "malformed": (mission(f"{RUN}<entity>"), "bad.xml:3"),
+    "malformed": (mission(f"{RUN}<a b=1/>"), "bad.xml:2"),
     "entity_bomb": (mission(f"{RUN}<seed>&a9;</seed>", BILLION_LAUGHS + "\n"), "bad.xml:1"),
     "path_outside": (
         mission(f'{RUN}<xi:include xmlns:xi="http://www.w3.org/2001/XInclude" href="../../../../etc/passwd"/>'),

@@ -57,6 +57,7 @@ def said(change):
     file = Path("out/batch.json")
     info = json.loads(file.read_text())
     change(info["mission"])
+    info.pop("checksum", None)  # else it is damaged
     file.write_text(json.dumps(info))
 
 

@@ -88,7 +88,7 @@ def test_a_game_is_served_steered_and_ended_with_its_summary(watching, folder):
         code, out, err = command.end()
     assert code == 0, "Ctrl-C is the way to end it"
     assert "A small game" in out
-    assert "1 steps of 0.1 s" in out
+    assert "1 step of 0.1 s" in out
     assert "kept" in out
     assert "Traceback" not in err
     assert (folder / "kept" / "run.json").exists()

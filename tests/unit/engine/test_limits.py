@@ -106,7 +106,7 @@ def test_a_world_without_a_place_ends_and_the_others_are_as_alone():
 
 
 def test_a_birth_without_a_place_ends_its_world_only():
-    late = block("late", count=2, rate=5.0, first_birth=0.5, variance=(1, 1, 1))
+    late = block("late", count=2, rate=5.0, first_birth=0.5, variance=(1, 1, 1), without_space="fail")
     game = mission(block(count=2, variance=(9, 9, 9)), late, interactions=[Shut()])
     results = Simulation(game, seeds=[1, 2], params={"Shut.is_shut": [False, True]}).run()
     assert [(r.end, r.steps) for r in results] == [("time", 10), ("error", 5)]

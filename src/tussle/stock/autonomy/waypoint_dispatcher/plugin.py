@@ -87,7 +87,7 @@ class WaypointDispatcher(Autonomy):
         self.goal.publish(rows, pos=np.where(circles, self._on_tangent(rows, pos, target), goal))
         self._pass(rows, self._way_begin(g)[:, rows], pos)
         self._skip(rows, self.last[:, rows], pos)
-        self.last[:] = g.pos
+        self.last[:, rows] = pos
 
     def _way_begin(self, g: GroupView) -> np.ndarray:
         """Where the ways begin on which waypoints are reached [m], (3, n)."""
