@@ -321,9 +321,8 @@ def test_a_sphere_network_loses_messages_to_the_sender_itself():
 
 def test_a_unicycle_that_should_climb_to_its_prey_dives_and_loops():
     """A pursuer 200 m below its prey: 35 m/s, a pitch rate of 1.5 rad/s; the nose runs away from the prey, through -90 degrees."""
-    chase = block(
-        "a", team=2, autonomy=stock.Predator(max_speed=35), motion=stock.Unicycle(vel_max=35, turn_rate_max=2, pitch_rate_max=1.5, use_pitch=True)
-    )  # fmt: skip
+    motion = stock.Unicycle(vel_max=35, turn_rate_max=2, pitch_rate_max=1.5, use_pitch=True)
+    chase = block("a", team=2, autonomy=stock.Predator(max_speed=35), motion=motion)
     prey = block("prey", team=1, position=(500, 0, 200))
     lowest, roll = {}, {}
     for compat in ("scrimmage", ""):
