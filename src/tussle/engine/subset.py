@@ -116,7 +116,7 @@ def call_world_plugin(
     sub_view.deaths, sub_view.moved, sub_view.births = [], [], []
     sub_view.only, sub_view.table_rows = worlds, rows
     if view.start_pos.shape[1] == bodies.n:
-        sub_view.start_pos = view.start_pos[:, rows]
+        sub_view.start_pos = np.take(view.start_pos, rows, axis=1)  # contiguous, for kernels
     sub_view.reset(sub_bodies, 0, len(rows))
     sub = copy.copy(world_binding)
     sub.plugin = _sub_plugin(world_binding.plugin, sub_view)
