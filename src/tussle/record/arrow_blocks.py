@@ -29,8 +29,8 @@ END_MARK = struct.pack("<Ii", 0xFFFFFFFF, 0)
 KEY = "checksum"
 """Name of the metadata entry that holds the checksum of a block."""
 CHUNK = 1 << 20
-MOST_SEARCHED = 1 << 30
-"""Bytes that are read in search of intact blocks, at most: a damaged length may make a file seem enormous."""
+MOST_SEARCHED = 128_000_000
+"""Bytes behind a damaged block that are searched for the next intact one, far more than a block has: a file may seem enormous."""
 MAX_SEARCH = 8
 """Bytes that the search for intact blocks behind damaged ones may read, per byte of the file: a file can be made to be slow to search."""
 _START = re.compile(rb"\xff{4}(?=[\s\S]{3}\x00)")
@@ -148,7 +148,7 @@ def find_blocks(path: Path, *, is_checked: bool = True) -> StreamBlocks:
         InvalidStreamError: It is not an Arrow stream, or a message of a stream without checksums is invalid.
     """
     size, found = size_of(path), StreamBlocks()
-    search = _Search(min(MAX_SEARCH * size, MOST_SEARCHED))
+    search = _Search(MAX_SEARCH * size)
     with path.open("rb") as file:
         at = 0
         while at < size and not (_is_end(file, at) and at and (at + 8 == size or not found.is_sealed)):
@@ -189,12 +189,10 @@ class _Search:
 
     def next_intact(self, file: BinaryIO, at: int, size: int) -> int | None:
         """Position of the first intact block from a position on; None if there is none."""
-        while at < size:
+        end = min(size, at + MOST_SEARCHED)
+        while at < end:
             file.seek(at)
             chunk = file.read(CHUNK + 7)
-            self.left -= len(chunk)
-            if self.left < 0:
-                return None
             for match in _START.finditer(chunk):
                 place = at + match.start()
                 self.left -= 8 + int.from_bytes(chunk[match.start() + 4 : match.start() + 8], "little")
