@@ -26,6 +26,7 @@ import game
 import numpy as np
 
 from tussle import Mission, Simulation
+from tussle.mission.spec import SHUFFLED, UPDATES
 from tussle.stock import Boids, SimpleCapture, SimpleCollision
 
 Z_99 = 2.5758
@@ -61,7 +62,7 @@ def play(job: tuple[str, str, list[int]]) -> list[tuple[int, int, int, int, floa
     """(seed, score of team 2, score of team 3, prey left, end time) of each seed."""
     update, law, seeds = job
     game = mission(update, law)
-    size = 1 if update.startswith("random") else len(seeds)  # these take one world at a time
+    size = 1 if update in SHUFFLED else len(seeds)  # these take one world at a time
     results = [
         r for i in range(0, len(seeds), size) for r in Simulation(game, seeds=seeds[i : i + size]).run()
     ]
@@ -126,9 +127,7 @@ def compare(ours: np.ndarray, theirs: np.ndarray) -> list[dict[str, Any]]:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument(
-        "--update", choices=("sequential", "synchronous", "random", "random_in_blocks"), default="sequential"
-    )
+    parser.add_argument("--update", choices=UPDATES, default="sequential")
     parser.add_argument("--law", choices=("historic", "corrected"), default="historic")
     parser.add_argument("--compat", action="store_true", help="play by the laws of SCRIMMAGE of 2025")
     parser.add_argument("--seeds", type=int, default=1000)
@@ -139,7 +138,7 @@ def main() -> None:
     if args.compat:
         args.update, args.law = "synchronous", "scrimmage"
     seeds = list(range(1, args.seeds + 1))
-    size = 5 if args.update.startswith("random") else STACK
+    size = 5 if args.update in SHUFFLED else STACK
     jobs = [(args.update, args.law, seeds[i : i + size]) for i in range(0, len(seeds), size)]
     begin = time.perf_counter()
     with multiprocessing.get_context("spawn").Pool(args.processes) as pool:

@@ -48,11 +48,8 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
             terminalreporter.write_line(f"{n:5}  {reason}")
     if named := os.environ.get("TUSSLE_SKIPPED_TESTS"):
         both = (r for r in terminalreporter.stats.get("passed", []) if "with_and_without" in r.keywords)
-        # A test for each of what is not there has no name of its own: it is played for all that is there.
-        every = (report for report in skipped if "empty parameter set" in report.longrepr[2])
-        names = dict.fromkeys(report.nodeid for report in (*skipped, *both))
-        names |= dict.fromkeys(report.nodeid.partition("[")[0] for report in every)
-        names = [name for name in names if not name.endswith("[NOTSET]")]
+        # Where a test had nothing to be played for, it is played for all that there is then.
+        names = dict.fromkeys(report.nodeid.removesuffix("[NOTSET]") for report in (*skipped, *both))
         Path(named).write_text("".join(f"{name}\n" for name in names))
 
 

@@ -52,6 +52,13 @@ def test_it_ends_soon_in_one_message_and_writes_nothing(tussle, folder, name):
     assert {p.name for p in folder.iterdir()} == {"bad.xml", "game.xml"}
 
 
+def test_of_a_tag_that_is_not_closed_both_the_place_and_the_end_are_told(tussle, folder):
+    (folder / "bad.xml").write_text(mission(f"{RUN}<entity>"))
+    done = tussle("run", "bad.xml", code=1)
+    errors = [line for line in done.stderr.splitlines() if line.startswith("error: ")]
+    assert [line.split(": ")[1] for line in errors] == ["bad.xml:3", "bad.xml:4"]
+
+
 def test_all_that_is_wrong_is_told_at_once_with_a_line_each(tussle, folder):
     tags = '<count>x</count>\n<autonomy max_speed="3 kg">Boids</autonomy>\n<motion_model>Unicyle</motion_model>\n'
     (folder / "bad.xml").write_text(with_entity(tags))

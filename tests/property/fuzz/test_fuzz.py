@@ -18,7 +18,7 @@ from tussle.errors import TussleError
 
 N_MISSIONS = int(os.environ.get("TUSSLE_FUZZ", "200"))
 N_FAST = 80  # of these, in the tests that are not slow
-N_CHECKED = 8
+N_CHECKED = 16
 N_SMALL = int(os.environ.get("TUSSLE_FUZZ", "40"))
 CHUNK = 10
 pytestmark = [
