@@ -27,6 +27,7 @@ from tussle.api import (
 )
 from tussle.columns import Field
 from tussle.errors import DeclarationError, ParameterError, PluginError
+from tussle.numeric import total
 from tussle.stock import SingleIntegrator
 
 
@@ -157,7 +158,7 @@ class EasyEyes(EasyAutonomy):
             assert (
                 near[-1].distance
                 == me.distance(near[-1])
-                == math.sqrt(sum(v * v for v in near[-1].offset.tolist()))
+                == math.sqrt(total(v * v for v in near[-1].offset.tolist()))
             )
 
 

@@ -95,7 +95,7 @@ class JSBSimControl(SphericalEarth, jsbsim_model.JSBSimControl):
 
 def _turned(angle: np.ndarray) -> np.ndarray:
     """A compass heading of an angle counter-clockwise from East, and back [deg], in [0, 360)."""
-    return np.mod(90.0 - angle, 360.0)
+    return np.asarray(np.mod(90.0 - angle, 360.0))
 
 
 __all__ = ["JSBSimControl", "JSBSimModel"]
