@@ -11,7 +11,6 @@ import pytest
 from tussle.aircraft.compile import CompiledAircraft, GeneratedKernel, compile_aircraft
 from tussle.aircraft.initial import place, run_initial
 from tussle.aircraft.node import MOST_NODES, AircraftError, read_text
-from tussle.stock.motion.jsbsim_compiled.flightgear import PROPERTIES
 
 DT = 1.0 / 120.0
 START = {
@@ -72,8 +71,7 @@ def both_flights(name, start, end, script, start_engines=True):
     for key, value in start.items():
         fdm[key] = value
     fdm.run_ic()
-    # With what a FlightGear is sent, so that test_flightgear.py need not compile another.
-    aircraft = compile_aircraft(None, name, (), PROPERTIES if name == "c172p" else ())
+    aircraft = compile_aircraft(None, name)
     x = aircraft.first[:, None].copy()
     single = [
         np.array([fdm[key]])
