@@ -114,10 +114,12 @@ def test_a_light_aircraft_flies_in_wind_as_in_jsbsim():
     assert apart("c172p", {**START, "ic/h-sl-ft": 5000.0, "ic/vt-fps": 180.0}, 60.0, in_wind) < 1e-6
 
 
+@pytest.mark.slow
 def test_a_light_aircraft_rolls_along_the_runway_as_in_jsbsim():
     assert apart("c172p", GROUND, 12.0, roll_along) < 1e-3
 
 
+@pytest.mark.slow
 def test_a_take_off_from_standstill_is_that_of_jsbsim():
     far, fdm = both_flights("c172p", GROUND, 27.0, take_off)
     assert fdm["position/h-agl-ft"] > 50.0

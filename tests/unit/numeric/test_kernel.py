@@ -613,6 +613,7 @@ def project(tmp_path):
     return run
 
 
+@pytest.mark.slow
 def test_edits_are_seen_and_only_what_changed_compiles(project):
     assert project() == [20.0, 1.5, 2.0, 3.0, 7.0, 5, 0]
     project.edit("constants.py", "9.0", "99.0")  # an imported constant
