@@ -6,7 +6,6 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 import pytest
-from scipy.stats import binomtest, t
 
 from tussle.batch.report.drawing import blank, house_style, inlined, pictured, printable, shortened
 from tussle.batch.report.formatting import (
@@ -57,6 +56,8 @@ def mean(values, seed, draw=None, *, is_share=False):
 
 
 def test_independent_runs_have_students_and_wilsons_intervals():
+    from scipy.stats import binomtest, t
+
     values = np.random.default_rng(1).normal(5.0, 2.0, 30)
     expected = t.interval(0.95, 29, values.mean(), values.std(ddof=1) / np.sqrt(30))
     np.testing.assert_allclose(mean(values, np.arange(30)), [values.mean(), *expected])
@@ -89,6 +90,8 @@ def test_the_interval_over_drawn_points_and_seeds_holds_the_mean_as_often_as_it_
 
 
 def test_few_seeds_give_an_interval_over_points_only_and_unknown_runs_are_left_out():
+    from scipy.stats import t
+
     values = np.random.default_rng(4).normal(size=40)
     expected = t.interval(0.95, 39, values.mean(), values.std(ddof=1) / np.sqrt(40))
     np.testing.assert_allclose(mean(values, np.ones(40), np.arange(40))[1:], expected)
