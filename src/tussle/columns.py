@@ -83,7 +83,10 @@ class Numbers(Column):
         text_units: Unit of a bare number in a text, for each component.
         dtype: float, int or bool.
         ragged: Whether each row holds a list, of any length, of items with these components; the array is a `RaggedColumn`.
+        recorded: Whether run directories have the column without being asked.
     """
+
+    recorded: bool = False
 
     def __init__(
         self, fields: str, unit: str, dtype: type, doc: str, ragged: bool = False, text_unit: str = ""
@@ -109,6 +112,14 @@ class Numbers(Column):
         return f"list of {' '.join(self.fields)}".strip() if self.ragged else " ".join(
             self.fields
         ), f"[{self.unit}]" * bool(self.unit)
+
+    def _set_recorded(self, recorded: bool, per: str = "entity") -> None:
+        if recorded and (self.ragged or per != "entity"):
+            what = "a ragged column" if self.ragged else f"a column per {per}"
+            raise DeclarationError(
+                f"{type(self).__name__}: {what} is not recorded; recorded=True needs one value per entity"
+            )
+        self.recorded = recorded
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -321,6 +332,7 @@ class State(Numbers):
         per: "entity"; for world plugins also "world" or "team".
         ragged: One list per entity, initially empty; `fields` are the components of an item.
         doc: One-line description.
+        recorded: Whether run directories have the column without being asked; see `tussle.Recorder`.
     """
 
     def __init__(
@@ -332,8 +344,10 @@ class State(Numbers):
         per: str = "entity",
         ragged: bool = False,
         doc: str = "",
+        recorded: bool = False,
     ) -> None:
         super().__init__(fields, unit, dtype, doc, ragged)
+        self._set_recorded(recorded, per)
         if per not in PER:
             raise DeclarationError(f"State: per={per!r} is not one of {', '.join(PER)}")
         if ragged and (per != "entity" or default):
@@ -396,12 +410,15 @@ class Output(Channel):
 
     Args:
         finite: Whether all values are finite; False for a range that is inf where nothing is. The conformance kit checks it.
+        recorded: As of `State`.
     """
 
     def __init__(
         self, channels: str = "", unit: str = "", ragged: bool = False, fields: str = "", doc: str = "", finite: bool = True,
+        recorded: bool = False,
     ) -> None:  # fmt: skip
         super().__init__(channels, unit, ragged, fields, doc)
+        self._set_recorded(recorded)
         self.default = 0.0
         self.finite = finite
 
