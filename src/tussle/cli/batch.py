@@ -55,8 +55,8 @@ def batch(options: BatchOptions) -> int:
     until = None if options.until is None else Until.parse(options.until)
     planned = batch_of(options)
     recorded = run_numbers(options.record_runs, planned.plan.n_runs)
-    for number in recorded if options.record_columns else ():
-        select(planned.missions[planned.plan.point(number)], options.record_columns)
+    for number in recorded:
+        select(planned.missions[planned.plan.point(number)], options.record_columns or "")
     directory = options.directory or planned.default_directory()
     with ExitStack() as stack:
         executor = None

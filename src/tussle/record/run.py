@@ -104,8 +104,8 @@ class Run:
     def _read_table(self, name: str, schema: pa.Schema, rules: Rules, is_mapped: bool) -> pa.Table:
         path, notes = self.path / name, list[str]()
         batches = read_batches(path, notes, RecordError, schema, rules, is_mapped=is_mapped, damage=notes)
-        found = list(batches)
-        table = pa.Table.from_batches(found, found[0].schema if found else schema)
+        complete = list(batches)
+        table = pa.Table.from_batches(complete, complete[0].schema if complete else schema)
         written = self.info.get("files", {}).get(name)
         if not notes and written is not None:
             found = {"bytes": path.stat().st_size, "rows": table.num_rows}
