@@ -8,6 +8,7 @@ page all read this declaration.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Iterable
 from typing import Any
 
@@ -20,6 +21,7 @@ from tussle.errors import DeclarationError, ParameterError, UnitError, nearest_n
 PER = ("entity", "world", "team")
 MAX_NUMBER = 1e30
 """Largest finite number of a parameter: with larger ones, products of a few overflow."""
+WHOLE = re.compile(r"[+-]?[0-9]{1,20}")
 MOST_INTEGER = 2**53
 """All integers up to this magnitude are exact in float64."""
 
@@ -139,6 +141,8 @@ class Numbers(Column):
             return texts.items(text, parts, bool(self.fields), from_geodetic)
         if self.fields:
             return texts.row(text, parts)
+        if self.dtype is int and WHOLE.fullmatch(text.strip()):
+            return int(text)
         return texts.truth(text) if self.dtype is bool else units.parse(text, *parts[0][1:])
 
 
@@ -291,6 +295,8 @@ class Param(Numbers):
         number = int(value) if self.dtype is int else float(value)
         if not self.is_within(number):
             raise self._error(where, value, self.allowed())
+        if self.dtype is int and not -(2**63) <= number < 2**63:
+            raise self._error(where, value, f"{self.allowed()} of 64 bits")
         if MAX_NUMBER < abs(number) < math.inf:
             raise self._error(where, value, f"{self.allowed()} and of at most {MAX_NUMBER:g}")
         return number

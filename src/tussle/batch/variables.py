@@ -26,7 +26,7 @@ COLUMNS = ("run", "point", "seed")
 
 MODIFIERS = ("int", "log")
 WHOLE = re.compile(r"[-+]?\d{1,9}", re.ASCII)
-WHOLE_VALUE = re.compile(r"[-+]?\d{1,18}", re.ASCII)
+WHOLE_VALUE = re.compile(r"[-+]?\d{1,19}", re.ASCII)
 LARGEST_WHOLE = 10**15
 """Up to here a whole number plus one half is a float."""
 
@@ -312,7 +312,7 @@ def parse_values(name: str, text: str) -> Variable:
 
 def read_value(text: str) -> Value:
     """A text as a number where it is one."""
-    if WHOLE_VALUE.fullmatch(text):
+    if WHOLE_VALUE.fullmatch(text) and -(2**63) <= int(text) < 2**63:
         return int(text)
     match = QUANTITY.fullmatch(text) if len(text) <= LONGEST_TEXT else None
     is_number = match is not None and not match["unit"] and not match["number"].endswith("inf")
