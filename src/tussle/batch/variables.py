@@ -246,7 +246,7 @@ def check_value(name: str, value: Any) -> None:
         wrong = "a choice is a text, a number, or true or false"
     elif isinstance(value, float) and not math.isfinite(value):
         wrong = "a number is finite"
-    elif isinstance(value, int) and abs(value) >= 2**63:
+    elif isinstance(value, int) and not -(2**63) <= value < 2**63:
         wrong = "whole numbers are allowed up to 2^63 - 1"
     else:
         return

@@ -280,6 +280,11 @@ class Recording:
         """Columns of plugins that were recorded with the states, by name."""
         return self.run.columns
 
+    @cached_property
+    def parts(self) -> set[str]:
+        """Columns of the table of states that belong to plugins."""
+        return {part for column in self.columns.values() for part in column.parts}
+
     def values(self, i: int, name: str) -> np.ma.MaskedArray[Any, Any]:
         """Values of a column of plugins in a frame, (n, k), in the order of its ids; masked where an entity does not have the column.
 

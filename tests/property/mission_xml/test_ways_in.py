@@ -127,7 +127,7 @@ def ways(folder, path, value):
 
 @pytest.mark.parametrize("path", VALUES)
 def test_a_value_is_the_same_whichever_way_it_comes_in(folder, path):
-    @settings(max_examples=8, deadline=None)
+    @settings(max_examples=8)
     @given(VALUES[path])
     def check(value):
         found = dict(ways(folder, path, value))
