@@ -38,6 +38,7 @@ from tussle.cli.tables import estimate, fact_list, number_tables, title
 from tussle.cli.terminal import OK, PLUGIN_FAILED, RUNS_FAILED, put, say, say_error, say_note
 from tussle.errors import BatchError, ParameterError, RecordError
 from tussle.record import load_run
+from tussle.record.plugin_columns import select
 
 MOST_POINTS = 12
 """Points that the end of a batch shows; `tussle analyze` shows all."""
@@ -54,6 +55,8 @@ def batch(options: BatchOptions) -> int:
     until = None if options.until is None else Until.parse(options.until)
     planned = batch_of(options)
     recorded = run_numbers(options.record_runs, planned.plan.n_runs)
+    for number in recorded:
+        select(planned.missions[planned.plan.point(number)], options.record_columns or "")
     directory = options.directory or planned.default_directory()
     with ExitStack() as stack:
         executor = None
@@ -165,7 +168,7 @@ def run_numbers(text: str | None, n_runs: int) -> list[int]:
 def record_run(
     planned: Batch, options: BatchOptions, directory: Path, number: int, interrupt: Interrupt
 ) -> None:
-    """Play a run again and record it, unless it is recorded.
+    """Play a run again and record it, unless it is recorded with the same columns.
 
     Raises:
         BatchError: The run ended otherwise than in the batch.
@@ -173,7 +176,8 @@ def record_run(
     """
     target = directory / store.RUNS / f"{number:06d}"
     try:
-        if load_run(target).is_complete:
+        found = load_run(target)
+        if found.is_complete and options.record_columns in (None, found.info.get("columns")):
             return
     except RecordError:  # there is no run, or a damaged one
         pass
@@ -187,7 +191,7 @@ def record_run(
     )
     with (
         simulate(run.loaded, run.mission, run.seed) as simulation,
-        record(simulation, target, run.loaded) as recorder,
+        record(simulation, target, run.loaded, columns=options.record_columns) as recorder,
     ):
         simulation.run_until(lambda _: bool(interrupt.code))
         interrupt.check()

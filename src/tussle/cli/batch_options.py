@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from tussle.cli.options import LARGEST_SEED, MissionOptions, argument, flag, option
+from tussle.cli.options import LARGEST_SEED, MissionOptions, argument, columns_option, flag, option
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,11 +81,14 @@ class BatchOptions(ManyGamesOptions):
         ),
     ] = None
     record_runs: Annotated[str | None, option("RUNS", "Record these runs in full: 417,3,10:20.")] = None
+    record_columns: Annotated[str | None, columns_option()] = None
     scheduler: Annotated[str | None, option("ADDRESS", "Play on a Dask cluster: tcp://HOST:8786.")] = None
     slurm: Annotated[str | None, option("N[,OPTION=VALUE...]", "Play in N Slurm jobs.")] = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        if self.record_columns is not None and self.record_runs is None:
+            raise typer.BadParameter("--record-columns is allowed with --record-runs only")
         if self.scheduler is None and self.slurm is None:
             return
         if self.processes is not None:

@@ -30,6 +30,7 @@ from tussle.displays import counted
 from tussle.engine.simulation import Simulation
 from tussle.errors import BatchError, MissionError, ParameterError, RecordError, TussleError, WiringError
 from tussle.mission import Loaded, Mission, to_python, to_xml
+from tussle.record.plugin_columns import select
 from tussle.record.schema import RUN_FILE, TRAJECTORY_FILE
 
 if TYPE_CHECKING:
@@ -63,17 +64,19 @@ def record(
     loaded: Loaded,
     period: float | None = None,
     shapes: bool = False,
+    columns: str | None = None,
 ) -> Recorder:
     """Return a recorder of a simulation.
 
     Raises:
         RecordError: The directory cannot be written.
+        ParameterError: A column does not exist.
     """
     from tussle.record import Recorder
 
     return Recorder(
         simulation, directory, period=period, mission_text=loaded.text, parameters=loaded.settings, shapes=shapes,
-        scene_files=loaded.scene_files, mission_notes=loaded.game_notes,
+        columns=columns or (), scene_files=loaded.scene_files, mission_notes=loaded.game_notes,
     )  # fmt: skip
 
 
@@ -211,8 +214,13 @@ def run(options: RunOptions) -> int:
             interrupt = stack.enter_context(Interrupt())
             simulation.state.context.is_interrupted = lambda: bool(interrupt.code)
             if not options.no_log:
+                select(
+                    mission, options.record_columns or ""
+                )  # a wrong name is found before a directory is made
                 directory = options.directory or _new_directory(name, seed)
-                recorder = record(simulation, directory, loaded, options.log_period, options.shapes)
+                recorder = record(
+                    simulation, directory, loaded, options.log_period, options.shapes, options.record_columns
+                )
             if recorder is not None:
                 stack.push(partial(_close_interrupted, recorder))
             simulation.step()  # loads or compiles kernels, so it counts as preparation

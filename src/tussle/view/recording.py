@@ -10,11 +10,13 @@ from typing import Any
 
 import numpy as np
 import pyarrow as pa
+import pyarrow.compute as pc
 
 from tussle.api.draw import KINDS
-from tussle.errors import RecordError, TussleError
+from tussle.errors import ParameterError, RecordError, TussleError, listed, nearest_name
 from tussle.mission import Loaded, Mission, read_mission
 from tussle.record import Run, load_run
+from tussle.record.plugin_columns import PluginColumn
 from tussle.record.schema import MISSION_FILE, RUN_FILE, SHAPES_FILE, TRAJECTORY_FILE
 from tussle.view.drawn import Shape
 from tussle.view.frame import Event, Frame, empty_frame
@@ -26,6 +28,14 @@ MOST_EMPTY = 5_000_000
 MOST_SAMPLED = 60
 """Frames that are sampled of a run that stays in its file."""
 POS, QUAT, VEL = ("x", "y", "z"), ("qw", "qx", "qy", "qz"), ("vx", "vy", "vz")
+
+
+def masked(column: pa.ChunkedArray) -> np.ma.MaskedArray[Any, Any]:
+    """Numbers of a table's column, (n,), masked where they are null."""
+    return np.ma.array(
+        pc.fill_null(column, False if column.type == pa.bool_() else 0).to_numpy(),
+        mask=column.is_null().to_numpy(),
+    )
 
 
 class Recording:
@@ -264,6 +274,33 @@ class Recording:
         if self._is_mapped:
             self._check(step, ids, block, pos, quat)
         return Frame(t, step, ids, team, block, pos, quat, vel, self._column(first, last, "health"))
+
+    @property
+    def columns(self) -> dict[str, PluginColumn]:
+        """Columns of plugins that were recorded with the states, by name."""
+        return self.run.columns
+
+    @cached_property
+    def parts(self) -> set[str]:
+        """Columns of the table of states that belong to plugins."""
+        return {part for column in self.columns.values() for part in column.parts}
+
+    def values(self, i: int, name: str) -> np.ma.MaskedArray[Any, Any]:
+        """Values of a column of plugins in a frame, (n, k), in the order of its ids; masked where an entity does not have the column.
+
+        Raises:
+            ParameterError: The column was not recorded.
+        """
+        if name not in self.columns:
+            known = self.columns
+            raise ParameterError(
+                f"{self.path}: no column {name!r} was recorded{nearest_name(name, known)}; {listed(known)}"
+            )
+        first, n = int(self._first[i]), int(self._last[i] - self._first[i])
+        return np.ma.stack(
+            [masked(self.run.trajectory_table[part].slice(first, n)) for part in self.columns[name].parts],
+            axis=1,
+        )
 
     def _check(
         self, step: int, ids: np.ndarray, block: np.ndarray, pos: np.ndarray, quat: np.ndarray

@@ -1,5 +1,5 @@
 // A live game: its newest frame, and those before, for the trails.
-/** @import { Curves, EventRow, PageData, Sample, Status } from './types' */
+/** @import { Curves, EventRow, PageData, Sample, Section, Status } from './types' */
 
 import { Chunk, Moment } from './chunk.js';
 import { lastWhere, Layer } from './layer.js';
@@ -87,6 +87,12 @@ export class Live extends Layer {
       append(this.scores, status.t, this.page.teams.map(({ id }) => status.scores[id] ?? 0));
     }
     this.changed();
+  }
+
+  /** Columns of an entity's plugins, and its messages. @param {number} id @returns {Section[]} */
+  sectionsOf(id) {
+    const entity = this.status?.entity;
+    return entity?.id === id ? entity.sections.slice(1) : [];
   }
 
   show() {

@@ -7,6 +7,10 @@ export type Colour = ArrayLike<number>;
 export interface Mesh { vertices: number[]; faces: number[]; }
 export interface Team { id: number; name: string; colour: number[]; }
 export interface Block { name: string; team: number; colour: number[]; model: string; lengths: number[]; }
+/** A column of plugins that was recorded: a component per field, or one without fields. */
+export interface Column { name: string; kind: 'float' | 'int' | 'bool'; fields: string[]; units: string[]; doc: string; }
+/** Title, and names, values and descriptions. */
+export type Section = [string, [string, string, string?][]];
 /** Values of each team at some times. */
 export interface Curves { t: number[]; n: number[][]; }
 export interface GameEvent { t: number; kind: string; id: number; other: number; text: string; }
@@ -28,7 +32,7 @@ export interface PageData {
   isComplete: boolean; attitudeUnit: number; healthSteps: number;
   // Of a recorded run.
   nFrames?: number; nStates?: number; nEntities?: number; mostAtOnce?: number; chunks?: [number, number][]; curves?: Curves; positionError?: number;
-  angleError?: number; begins?: number; warp?: number | null; isPlaying?: boolean; lead?: string; shapeFrames?: number;
+  angleError?: number; begins?: number; warp?: number | null; isPlaying?: boolean; lead?: string; shapeFrames?: number; columns?: Column[];
   // Of a live game.
   seed?: number;
 }
@@ -38,7 +42,7 @@ export interface Status {
   t: number; step: number; span: [number, number]; epoch: number; seed: number; isPaused: boolean; isOver: boolean; isSeeking: boolean;
   warp: number | null; reached: number; rate: number; notes: string[]; error: string | null; scores: Record<string, number>;
   metrics: [string, string][]; events: { from: number; rows: EventRow[] }; refusal: string | null; steers: boolean;
-  entity: { id: number; sections: [string, [string, string][]][] } | null;
+  entity: { id: number; sections: Section[] } | null;
 }
 
 /** Shapes of plugins, see drawing.py. */
