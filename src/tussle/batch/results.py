@@ -28,6 +28,7 @@ from tussle.batch.statistics import (
     share_of,
 )
 from tussle.batch.survival import N_TIMES, Survival, survival_of
+from tussle.batch.target import Answers, Layout, Target, answers_of
 from tussle.batch.variables import Choice, Range, Variable
 from tussle.batch.varied import variable_of
 from tussle.displays import counted, line, listing, page, table
@@ -150,7 +151,9 @@ class Results:
 
     @property
     def n_planned(self) -> int:
-        """Runs that were to be played."""
+        """Runs that were to be played; where points have different numbers of seeds, those that are finished."""
+        if self.info["is_complete"] and self.info.get("is_partial"):
+            return self.n_runs
         return int(self.info["n_runs"])
 
     @property
@@ -353,6 +356,24 @@ class Results:
         games = np.full((int(self._seed_index.max(initial=-1)) + 1, len(self.points)), -1)
         games[self._seed_index, self._point] = self._game
         return games
+
+    def answers(self, target: str | Target | None = None, over: str | None = None) -> Answers | None:
+        """The smallest value of a variable at which the mean of a quantity reaches a target, for each choice.
+
+        Args:
+            target: Such as "Guard.share >= 0.95"; None for that of the command that played the batch, if it had one.
+            over: Name of the variable; None for that of the command, else for the first range, else the first choice of numbers.
+
+        Raises:
+            ParameterError: There is no such quantity or variable, or the target is written otherwise.
+        """
+        if target is None and (target := self.info.get("target")) is None:
+            return None
+        asked = Target.parse(target) if isinstance(target, str) else target
+        layout = Layout.of(self.variables, self.points, over or self.info.get("over"))
+        return answers_of(
+            asked, self.title(str(asked.quantity)), layout, self.points, self.by_seed(str(asked.quantity))
+        )
 
     def select(self, text: str) -> list[int]:
         """The points at which variables have the values that a text such as "tactic=keep, prey_speed=20" names.
