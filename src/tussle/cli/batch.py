@@ -18,11 +18,11 @@ from rich.padding import Padding
 from rich.text import Text
 
 from tussle.batch import store
-from tussle.batch.analysis import leading
 from tussle.batch.batch import Batch
 from tussle.batch.executors import Executor
 from tussle.batch.further import RUNS, further_runs
 from tussle.batch.progress import Progress as BatchProgress
+from tussle.batch.quantities import column_name
 from tussle.batch.reload import planned_run
 from tussle.batch.results import Results
 from tussle.batch.selection import written
@@ -334,29 +334,29 @@ def short_names(variables: Sequence[Variable]) -> list[str]:
 
 
 def share_tables(results: Results) -> list[Padding]:
-    """Return one line per team, how often it won, its mean score, how many are left, and one per other usual quantity; with intervals."""
+    """Return one line per team, how often it won, its mean score, how many are left, and one per other quantity; with intervals."""
     shares = {share.team: share for share in results.shares()}
-    teams = results.teams if shares else {team: results.teams[team] for team in results.diminished}
+    word = "lost" if any(name.startswith("lost[") for name in results.defaults.all) else "left"
+    left = {team: column_name("lost" if word == "lost" else "alive", team) for team in results.diminished}
+    teams = results.teams if shares else {team: results.teams[team] for team in left}
     best = max((s.n for s in shares.values() if s.team is not None), default=0)
     rows = []
     for team, name in teams.items():
         share, cells = shares.get(team), [f"{team} {name}"]
         if shares:
             cells += ["", ""] if share is None else [f"{share.n:,}", _share(share)]
-            cells.append(_mean(results, f"score[{team}]"))
+            cells.append(_mean(results, column_name("score", team)))
         style = "green" if share is not None and share.n == best > 0 else ""
-        left = [_mean(results, f"alive[{team}]") if team in results.diminished else ""]
-        rows.append((style, [*cells, *(left if results.diminished else [])]))
-    head = ["team", *(["won", "share of wins, %", "mean score"] if shares else [])]
-    head += ["left"] if results.diminished else []
+        rows.append((style, [*cells, *([_mean(results, left.get(team, ""))] if left else [])]))
+    head = ["team", *(["won", "share of wins, %", "mean score"] if shares else []), *([word] if left else [])]
     if None in shares:
         cells = ["  ties", f"{shares[None].n:,}", _share(shares[None])]
         rows.append(("dim", [*cells, *[""] * (len(head) - len(cells))]))
-    shown = [
-        f"{metric}[{team}]" for metric in (["score", "alive"] if shares else ["alive"]) for team in teams
-    ]
+    in_rows = [*left.values(), *(column_name("score", team) for team in teams if shares)]
     others = [
-        ("", [results.title(name), _mean(results, name)]) for name in results.usual if name not in shown
+        ("", [results.title(name), _mean(results, name)])
+        for name in results.defaults.all
+        if name not in in_rows
     ]
     return [
         *(number_tables(head, rows) if rows else []),
@@ -414,7 +414,7 @@ def point_tables(results: Results) -> list[Padding]:
     """Return one line per point: its values, and who won how often there, or the leading quantities where nobody wins."""
     winners = [share for share in results.shares() if share.n]
     teams = [share.team for share in winners]
-    means = {} if winners else {name: results.means_by_point(name) for name in leading(results)}
+    means = {} if winners else {name: results.means_by_point(name) for name in results.defaults.leading}
     head = ["point", *short_names(results.variables), *(f"{share.name} won, %" for share in winners)]
     head += map(results.title, means)
     rows = [

@@ -131,10 +131,10 @@ def test_without_scores_it_tells_who_was_left():
         run: [(1, 0.0, 50), (1, 10.0 + run, 20 + run), (1, 100.0, 20 + run), (2, 0.0, 5), (2, 100.0, 5)]
         for run in range(30)
     }
-    stored = made_batch({}, metrics={"M.x": {None: np.arange(30.0)[:, None]}}, alive=lost)
+    stored = made_batch({}, metrics={"M.x": {None: np.ones((30, 1))}}, alive=lost)
     said = texts_of(stored)
     assert re.search(
-        r"34.5 of 50 prey \(95 % interval 3\d.\d to 3\d.\d\) were left on average in 30 games", said
+        r"On average, 34.5 of 50 prey were left \(95 % interval 3\d.\d to 3\d.\d\) in 30 games", said
     )
     assert "won" not in names_of(stored)
     assert "left" in names_of(stored)

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from tussle.batch.default_quantities import varies
 from tussle.batch.report.drawing import marker_of
 from tussle.batch.report.formatting import file_name
 from tussle.batch.results import Results
@@ -240,11 +241,10 @@ class ReportData:
             ) from None
         self.results = results
         self.points = results.points
-        self.more = tuple(Measure(e, self.title(e), None, self.title(e)) for e in more)
+        asked = dict.fromkeys(map(results.canonical, more))
+        self.more = tuple(Measure(e, self.title(e), None, self.title(e)) for e in asked)
         self.point: np.ndarray = np.asarray(results.runs["point"].to_numpy(), dtype=np.int64)
         self.seed: np.ndarray = np.asarray(results.runs["seed"].to_numpy())
-        for measure in self.more:
-            results.quantity(measure.expression)
 
     # -- names --------------------------------------------------------------------------------------------------------------
 
@@ -353,26 +353,32 @@ class ReportData:
     def wins(self) -> tuple[Measure, ...]:
         """Wins of the teams that score or win; empty for games without scores."""
         teams = [t for t in self.rivals if t in self.results.scored] if len(self.results.scored) > 1 else []
+        teams = [t for t in teams if not self._is_asked(f"wins[{t}]")]
         return tuple(Measure(f"wins[{t}]", self.name_of(t), t, "share of the games won", True) for t in teams)
 
     @cached_property
     def scores(self) -> tuple[Measure, ...]:
-        """Scores of the teams; in games without scores, the entities left at the end of teams that lost some."""
-        if self.rivals:
-            return tuple(Measure(f"score[{t}]", self.name_of(t), t, "score") for t in sorted(self.rivals))
-        teams = [t for t in self.results.diminished if varies(self.known(f"alive[{t}]"))]
-        return tuple(Measure(f"alive[{t}]", self.name_of(t), t, "left at the end") for t in teams)
+        """Quantities of teams among those that are shown if none are asked for: scores, or what is left or lost."""
+        kinds = {"score": "score", "alive": "left at the end", "lost": "lost"}
+        found = []
+        for name in self.results.defaults.leading:
+            match = _OF_TEAM.fullmatch(name)
+            if match is not None and not self._is_asked(name):
+                team = int(match[2])
+                found.append(Measure(name, self.name_of(team), team, kinds[match[1]]))
+        return tuple(found)
 
     @cached_property
     def measured(self) -> tuple[Measure, ...]:
-        """Quantities that the user asks for, and in games without scores what metrics and interactions measure."""
-        asked = [m.expression for m in self.more]
-        names = (
-            []
-            if self.rivals
-            else [n for n in self.results.measured if varies(self.known(n)) and n not in asked]
+        """Quantities that the user asks for, and what metrics and interactions measure."""
+        names = [n for n in self.results.defaults.leading if not _OF_TEAM.fullmatch(n) and n != "t"]
+        return (
+            *self.more,
+            *(Measure(n, self.title(n), None, self.title(n)) for n in names if not self._is_asked(n)),
         )
-        return (*self.more, *(Measure(n, self.title(n), None, self.title(n)) for n in names))
+
+    def _is_asked(self, name: str) -> bool:
+        return any(measure.expression == name for measure in self.more)
 
     @property
     def measures(self) -> tuple[Measure, ...]:
@@ -382,7 +388,10 @@ class ReportData:
     @property
     def groups(self) -> list[tuple[str, tuple[Measure, ...]]]:
         """Measures that share a plot, with the beginning of its file name."""
-        found = [("wins", self.wins), ("score" if self.rivals else "left", self.scores)]
+        found = [
+            ("wins", self.wins),
+            (self.scores[0].label.partition(" ")[0] if self.scores else "", self.scores),
+        ]
         found += [(file_name(m.expression), (m,)) for m in self.measured]
         return [(stem, measures) for stem, measures in found if measures]
 
@@ -411,11 +420,6 @@ class ReportData:
             return self.variables
         ranked = self.by_strength()[:MOST_VARIABLES]
         return tuple(v for v in self.variables if v in ranked)
-
-
-def varies(values: np.ndarray) -> bool:
-    """Return whether the values differ."""
-    return bool(len(values)) and bool(np.ptp(values) > 0.0)
 
 
 def _explained(values: np.ndarray, group: np.ndarray) -> float:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from tussle.batch.default_quantities import is_of_network, varies
 from tussle.batch.report import plots
 from tussle.batch.report.formatting import (
     capital,
@@ -23,9 +24,8 @@ from tussle.batch.report.formatting import (
     seconds,
     sentence,
 )
-from tussle.batch.report.report_data import Measure, ReportData, axis_of, varies
+from tussle.batch.report.report_data import Measure, ReportData, axis_of
 from tussle.batch.selection import written
-from tussle.batch.statistics import Mean
 from tussle.batch.variables import Range
 from tussle.event_texts import END_TEXTS, end_text
 from tussle.palette import PAPER, colour_of, mixed
@@ -192,7 +192,7 @@ def _means(data: ReportData) -> ReportTable:
         )
 
     names = [q for q in results.quantities if not q.startswith(("wins[", "ties", "start[", "lost[", "steps"))]
-    is_count = is_of_network(data)  # these have their own section
+    is_count = is_of_network(data.results.quantities)  # these have their own section
     names = [q for q in names if varies(data.known(q)) and not is_score_again(q) and not is_count(q)]
     rows = [
         (
@@ -266,7 +266,9 @@ def networks(data: ReportData) -> Section:
     """The section on messages of lossy networks."""
     means = {
         m.name: m.value
-        for m in data.results.means(list(filter(is_of_network(data), data.results.quantities)))
+        for m in data.results.means(
+            list(filter(is_of_network(data.results.quantities), data.results.quantities))
+        )
     }
     names = list(dict.fromkeys(name.rpartition(".")[0] for name in means))
     reasons = dict.fromkeys(
@@ -288,14 +290,6 @@ def networks(data: ReportData) -> Section:
     caption = "Mean number per game of messages to others within reach, each receiver counted, and what became of them."
     tables = [ReportTable("", columns, [row(name) for name in names], caption)] if names else []
     return Section("networks", "What became of the messages", tables=tables)
-
-
-def is_of_network(data: ReportData) -> Callable[[str], bool]:
-    """A function that returns whether a quantity is a count of a network."""
-    every = set(data.results.quantities)
-    plugins = {name.removesuffix(".delivered") for name in every if name.endswith(".delivered")}
-    found = {plugin for plugin in plugins if f"{plugin}.sent" in every}
-    return lambda name: name.rpartition(".")[0] in found
 
 
 def ended(data: ReportData) -> Section:
@@ -428,7 +422,7 @@ def answer(data: ReportData) -> str:
         f" over {count(len(data.points), 'point')}" if data.has_points else ""
     )
     if not data.wins:
-        return f"{_who_was_left(data)} in {games}."
+        return f"{_on_average(data)} in {games}."
     shares = [s for s in results.shares() if s.n > 0]
     ties = sum(s.n for s in shares if s.team is None)
     winners = sorted((s for s in shares if s.team is not None), key=lambda s: -s.n)
@@ -464,25 +458,21 @@ def _most_and_least(data: ReportData) -> Iterator[str]:
         yield f"{leader.name} won most with {best} and least with {worst}."
 
 
-def _who_was_left(data: ReportData) -> str:
-    """Return how many of each team were left, and else what was measured, for games without scores."""
-    found = []
+def _on_average(data: ReportData) -> str:
+    """Return the means of the first quantities, for games that nobody wins."""
+    found, results = [], data.results
     over = ", over these points" if data.has_points else ""
-
-    def mean_text(mean: Mean, of: str) -> str:
+    for mean in results.means(results.defaults.leading[:MAX_SAID]):
         known = f" (95 % interval {interval(mean.low, mean.high)}{over})" if math.isfinite(mean.low) else ""
-        return f"{estimate(mean.value)}{of}{known}"
-
-    for measure in data.scores:
-        left_, start = data.results.means([measure.expression, measure.expression.replace("alive", "start")])
-        found.append(mean_text(left_, f" of {number(start.value)} {measure.name}"))
-    if found:
-        return f"{' and '.join(found)} were left on average"
-    if measured := data.results.means(data.results.measured):
-        texts = [f"{data.title(m.name)} was {mean_text(m, '')}" for m in measured[:MAX_SAID] if m.n]
-        return f"On average, {' and '.join(texts)}"
-    teams = [t for t in data.results.teams if f"alive[{t}]" in data.results.quantities]
-    return f"All of {' and of '.join(map(data.name_of, teams))} were left" if teams else "Nothing was counted"
+        team = mean.name.removeprefix("alive")
+        if team != mean.name:
+            start = results.means([f"start{team}"])[0].value
+            found.append(
+                f"{estimate(mean.value)} of {number(start)} {results.title(mean.name).partition(' of ')[2]} were left{known}"
+            )
+        else:
+            found.append(f"{data.title(mean.name)} was {estimate(mean.value)}{known}")
+    return f"On average, {' and '.join(found)}"
 
 
 def notes(data: ReportData) -> list[str]:
