@@ -17,6 +17,7 @@ import pyarrow.compute as pc
 from tussle.batch import run_table
 from tussle.batch.default_quantities import COUNTED, DefaultQuantities, default_quantities, is_within_one
 from tussle.batch.quantities import Quantity, column_name, metric_of
+from tussle.batch.response import fit_response
 from tussle.batch.selection import is_number, known_point, paired_points, select_points, written
 from tussle.batch.sensitivity import Effect, effects, rank_effects
 from tussle.batch.statistics import (
@@ -29,7 +30,7 @@ from tussle.batch.statistics import (
     share_of,
 )
 from tussle.batch.survival import N_TIMES, Survival, survival_of
-from tussle.batch.target import Answers, Layout, Target, answers_of
+from tussle.batch.target import Answers, Layout, Target, answers_of, crossing_of
 from tussle.batch.variables import Choice, Range, Variable
 from tussle.batch.varied import variable_of
 from tussle.displays import counted, line, listing, page, table
@@ -377,9 +378,17 @@ class Results:
             return None
         asked = Target.parse(target) if isinstance(target, str) else target
         layout = Layout.of(self.variables, self.points, over or self.info.get("over"))
-        return answers_of(
-            asked, self.title(str(asked.quantity)), layout, self.points, self.by_seed(str(asked.quantity))
-        )
+        expression = str(asked.quantity)
+        found = answers_of(asked, self.title(expression), layout, self.points, self.by_seed(expression))
+        if found.over is None:
+            return found
+        try:
+            fit = fit_response(self, expression)
+        except ParameterError:  # too few points for a curve
+            return found
+        name = found.over.name
+        fitted = (replace(a, crossing=crossing_of(fit, asked, name, a.values)) for a in found.answers)
+        return replace(found, answers=tuple(fitted))
 
     def select(self, text: str) -> list[int]:
         """The points at which variables have the values that a text such as "tactic=keep, prey_speed=20" names.

@@ -7,7 +7,7 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -18,11 +18,16 @@ from tussle.batch.statistics import LEVEL
 from tussle.batch.variables import Choice, Range, Variable
 from tussle.errors import ParameterError, listed, nearest_name
 
+if TYPE_CHECKING:
+    from tussle.batch.response import Response
+
 SIGN = re.compile(r"<=|>=|≤|≥|<|>")
 TAKES = "it takes QUANTITY >= NUMBER or QUANTITY <= NUMBER, such as 'wins[2] >= 0.95'"
 MOST_PARTS = 8
 """Parts into which values are put together that were drawn with those of other variables."""
 LEAST_IN_PART = 5
+N_FITTED = 121
+"""Places at which a fit is looked at."""
 
 
 @dataclass(frozen=True)
@@ -110,16 +115,73 @@ class Level:
 
 
 @dataclass(frozen=True)
+class Crossing:
+    """Where a smooth fit of the quantity first reaches the target: an estimate that leans on all values, and not a proof.
+
+    Attributes:
+        value: Of the variable, by the fit; NaN where it stays below.
+        low: By the better end of the fit's 95 % band.
+        high: By its worse end; NaN where that does not reach the target.
+    """
+
+    value: float
+    low: float
+    high: float
+
+    @property
+    def text(self) -> str:
+        """The value with its interval: "13.4 (12.9 to 14.1)"."""
+        high = f"{self.high:.3g}" if math.isfinite(self.high) else "beyond"
+        return f"{self.value:.3g} ({self.low:.3g} to {high})"
+
+
+def crossing_of(response: Response, target: Target, over: str, choice: Mapping[str, Any]) -> Crossing | None:
+    """Where a fit reaches a target first; None where it nowhere does.
+
+    Args:
+        response: The fit.
+        target: The target.
+        over: Name of the variable.
+        choice: Values of the others that are held.
+    """
+    names = [axis.variable.name for axis in response.axes]
+    if over not in names:
+        return None
+    values = response.axis(over).values
+    space = np.geomspace if response.axis(over).is_log else np.linspace
+    x = space(float(values[0]), float(values[-1]), N_FITTED)
+    given = {name: value for name, value in choice.items() if name in names}
+    fit = response.along(over, x.tolist(), given)
+    ends = (fit.high, fit.low) if target.is_lower else (fit.low, fit.high)
+    value, low, high = (_first(x, y if target.is_lower else -y, target) for y in (fit.value, *ends))
+    return Crossing(value, low, high) if math.isfinite(value) else None
+
+
+def _first(x: np.ndarray, y: np.ndarray, target: Target) -> float:
+    """The smallest x from which on values y, of which more is better, reach the bound, between two of them by a straight line."""
+    above = y - (target.bound if target.is_lower else -target.bound)
+    places = np.flatnonzero(above >= 0.0)
+    if not len(places):
+        return math.nan
+    i = int(places[0])
+    if i == 0:
+        return float(x[0])
+    return float(x[i - 1] + (x[i] - x[i - 1]) * above[i - 1] / (above[i - 1] - above[i]))
+
+
+@dataclass(frozen=True)
 class Answer:
     """The answer for one choice, that is one value of each variable that is no number.
 
     Attributes:
         values: The choice: name -> value; empty where there is none.
         levels: Values of the variable, ascending.
+        crossing: Where a smooth fit reaches the target; None where it does not, or there is none.
     """
 
     values: dict[str, Any]
     levels: tuple[Level, ...]
+    crossing: Crossing | None = None
 
     @property
     def label(self) -> str:
@@ -203,7 +265,10 @@ class Answers:
 
     def sentences(self) -> list[str]:
         """One sentence for each choice."""
-        return [self._sentence(answer) for answer in self.answers]
+        return [self._sentence(answer) + self._fitted(answer) for answer in self.answers]
+
+    def _fitted(self, answer: Answer) -> str:
+        return "" if answer.crossing is None else f"; by a smooth fit it takes {answer.crossing.text}"
 
     def _sentence(self, answer: Answer) -> str:
         whose = f"{answer.label}: " if answer.label else ""
@@ -242,6 +307,7 @@ class Answers:
                     "is_decided": answer.is_decided,
                     "smallest": _of(answer.smallest),
                     "at_least": _of(answer.at_least),
+                    "fitted": None if (c := answer.crossing) is None else [*map(_plain, (c.value, c.low, c.high))],
                     "levels": [
                         {
                             "from": _plain(level.low), "to": _plain(level.high), "n": level.n, "state": level.state,

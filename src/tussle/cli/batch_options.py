@@ -127,6 +127,14 @@ class OptimizeOptions(ManyGamesOptions):
             "Quantity whose mean over the games is maximized: 'score[3]-score[2]', 'wins[2]', 't'.",
         ),
     ] = ""
+    subject_to: Annotated[
+        list[str],
+        option(
+            "EXPR",
+            "Constraint that the mean over the games is to keep: 'lost[1] / start[1] < 0.2'. Can be repeated.",
+            "--subject-to",
+        ),
+    ] = field(default_factory=list)
     minimize: Annotated[bool, flag("--minimize", "Minimize the quantity instead.")] = False
     trials: Annotated[int, option("N", "Sets of values to try.", min=1, shows_default=True)] = 100
     runs: Annotated[
