@@ -34,10 +34,14 @@ class RunOptions(MissionOptions):
         ),
     ] = ""
     from_batch: Annotated[
-        str | None, option("BATCH:RUN", "Play a run of a batch again instead of a mission.", "--from")
+        str | None,
+        option(
+            "BATCH:RUN", "Play a run of a batch, or a run directory, again instead of a mission.", "--from"
+        ),
     ] = None
     trust: Annotated[
-        bool, flag("--trust", "With --from: run the plugin code of a batch directory made by someone else.")
+        bool,
+        flag("--trust", "With --from: run the plugin code of a batch or run directory made by someone else."),
     ] = False
     directory: Annotated[
         Path | None, option("DIR", "Run directory; by default runs/NAME-SEED-TIMESTAMP.", "--out")

@@ -14,10 +14,11 @@ import numpy as np
 import pyarrow as pa
 
 from tussle.errors import MissionError, ParameterError, RecordError
-from tussle.mission import to_xml
+from tussle.mission import PluginFile, to_xml
 from tussle.record import run_file
 from tussle.record.events import BIRTH, END, Events
 from tussle.record.plugin_columns import ColumnReader, select
+from tussle.record.plugin_copies import plugin_copies
 from tussle.record.row_buffer import RowBuffer, RowSelection
 from tussle.record.schema import (
     EVENTS,
@@ -74,6 +75,7 @@ class Recorder:
             `recorded=True` are always recorded.
         scene_files: Files of terrain, meshes and textures that the mission's text names, which are copied, by name: see
             `tussle.mission.Loaded`.
+        plugin_files: Python files with the mission's plugins, which are copied: see `tussle.mission.Loaded`.
 
     Raises:
         RecordError: The directory holds a run, or cannot be written.
@@ -94,6 +96,7 @@ class Recorder:
         shapes: bool = False,
         columns: str | Iterable[str] = (),
         scene_files: Mapping[str, Path] | None = None,
+        plugin_files: Sequence[PluginFile] = (),
     ) -> None:
         for name, value in (("period", period), ("flush_every", flush_every)):
             if value is not None and not 0.0 < value < float("inf"):
@@ -120,11 +123,17 @@ class Recorder:
         self._common_step = -1
         self._steps = np.full(sim.n_worlds, -1, np.int64)
         self._others: list[str] = []
-        self._open(mission_text, shapes, scene_files or {})
+        self._open(mission_text, shapes, scene_files or {}, plugin_files)
         self._flush_at = time.monotonic() + flush_every
         self._begin()
 
-    def _open(self, mission_text: str | None, shapes: bool, scene_files: Mapping[str, Path]) -> None:
+    def _open(
+        self,
+        mission_text: str | None,
+        shapes: bool,
+        scene_files: Mapping[str, Path],
+        plugin_files: Sequence[PluginFile],
+    ) -> None:
         try:
             self.directory.mkdir(parents=True, exist_ok=True)
             held = [name for name in FILES if (self.directory / name).exists()]
@@ -142,6 +151,10 @@ class Recorder:
                     place.parent.mkdir(parents=True, exist_ok=True)
                     shutil.copyfile(file, place)
                     self._others.append(name)
+            for name, text in plugin_copies(plugin_files).items():
+                (self.directory / name).parent.mkdir(parents=True, exist_ok=True)
+                (self.directory / name).write_text(text, encoding="utf-8")
+                self._others.append(name)
         except OSError as error:
             raise RecordError(
                 f"{self.directory}: cannot record a run there: {error.strerror or error}"
