@@ -1,8 +1,9 @@
 // A game: its entities, where they are, and its events. The two subclasses are a recording (recorded.js) and a live game (live.js).
-/** @import { Curves, EventRow, GameEvent, PageData, Sample, Vector } from './types' */
+/** @import { EventRow, GameEvent, PageData, Sample, Vector } from './types' */
 
 import { minus, norm, scaled } from './geometry.js';
 import { Moment } from './chunk.js';
+import { SeriesBook } from './series.js';
 
 export const NO_TEAM = { id: 0, name: '', colour: [150, 160, 172] };
 /** Moments so long before and after what is shown are compared for a velocity [s]; the first that differ count. */
@@ -25,15 +26,10 @@ export class Layer {
     this.shown = new Moment();
     this.start = 0;
     this.end = 0;
-    /** Entities of each team at some times. */
-    this.curves = this.emptyCurves();
+    /** Quantities over time. */
+    this.series = new SeriesBook();
     /** A move above this is a jump [m]. */
     this.leap = 0.25 * norm(minus(page.scenery.high, page.scenery.low));
-  }
-
-  /** @returns {Curves} */
-  emptyCurves() {
-    return { t: [], n: this.page.teams.map(() => /** @type {number[]} */ ([])) };
   }
 
   /** Take events, without the deaths that a capture or a collision tells of. @param {EventRow[]} rows */
@@ -83,13 +79,6 @@ export class Layer {
   /** @param {number} slot */
   colourOf(slot) {
     return this.colour(this.shown.block[slot], this.shown.team[slot]);
-  }
-
-  /** Entities of each team that are shown. */
-  counts(moment = this.shown) {
-    const found = new Map(this.page.teams.map(({ id }) => [id, 0]));
-    for (let i = 0; i < moment.n; i++) found.set(moment.team[i], (found.get(moment.team[i]) || 0) + 1);
-    return this.page.teams.map(({ id }) => found.get(id));
   }
 
   /** @param {number} id */

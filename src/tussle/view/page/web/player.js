@@ -16,8 +16,8 @@ import { Viewpoint } from './viewpoint.js';
 import { fillHelp, listen } from './keys.js';
 import { actionsOf, listenToSettings } from './actions.js';
 
-/** Longer than any game [s]. */
-const WHOLE_GAME = 1e9;
+/** As far as it is looked back for the longest trails [s]. */
+const LONGEST_LOOK = 1e8;
 /** Time over which drawn frames are counted [ms]. */
 const RATE_SPAN = 4000;
 /** Least time between two looks back for the trails [ms]. */
@@ -81,8 +81,6 @@ export class Player {
     this.listen();
     this.resize();
     this.viewpoint.open();
-    // For the curves, and for the trails.
-    this.order('history', { seconds: WHOLE_GAME });
     this.lookBack();
     this.isReady = true;
     if (window.matchMedia('(hover: hover)').matches) this.say('h shows the keys');
@@ -113,6 +111,7 @@ export class Player {
           else if (isSparse) this.lookBackSoon();
           resolve();
         },
+        curves: (message) => layer.takeCurves(message),
         past: (header, bytes) => layer.takePast(header, bytes),
         drawn: (header, bytes) => {
           this.picture.shapes.take(header, bytes);
@@ -143,7 +142,7 @@ export class Player {
   lookBack() {
     this.lookedBack = performance.now();
     const seconds = TRAIL_LENGTHS[this.drawn.trail] || TRAIL_OF_CHOSEN;
-    this.order('history', { seconds: Math.min(seconds, 0.1 * WHOLE_GAME) });
+    this.order('history', { seconds: Math.min(seconds, LONGEST_LOOK) });
   }
 
   /** Look back once `LOOK_PERIOD` is over. */

@@ -23,7 +23,6 @@ export class Recorded extends Layer {
     this.reading = new Set();
     /** Shapes of plugins: groups of frames, each from a frame on. @type {Map<number, { frame: number, header: ShapesHeader, bytes: Uint8Array }[]>} */
     this.shapes = new Map();
-    this.curves = page.curves;
     this.times = new Float64Array(0);
     this.slack = 0;
   }
@@ -37,6 +36,7 @@ export class Recorded extends Layer {
     /** @type {EventRow[]} */
     const rows = JSON.parse(new TextDecoder().decode(await this.source.blob('events')));
     this.setEvents(rows);
+    this.series.take(JSON.parse(new TextDecoder().decode(await this.source.blob('curves'))));
   }
 
   get mostAtOnce() {

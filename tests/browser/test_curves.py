@@ -1,0 +1,131 @@
+"""Curves and numbers of the page in a real browser, compared with what they are of."""
+
+import pytest
+from guarded_gate import guarded_gate
+from recorded_games import hunt
+from served import UNHURRIED, Watched
+
+from tussle import Recorder, Simulation
+from tussle.batch import Batch, InProcess
+from tussle.view import Live, Recording
+from tussle.view.page.compare import Comparison
+from tussle.view.page.server import Page
+
+SEED = 5
+
+
+@pytest.fixture(scope="module")
+def alive():
+    """Team -> time and number of each row of a batch's `alive.parquet`, of the same game."""
+    rows = Batch(guarded_gate(), runs=1, first_seed=SEED).play(executor=InProcess()).alive.to_pylist()
+    return {team: [[r["t"], r["alive"]] for r in rows if r["team"] == team] for team in (1, 2)}
+
+
+def test_a_browser_that_comes_late_and_comes_back_shows_the_curves_of_the_batch(chromium, alive):
+    with (
+        Simulation(guarded_gate(), SEED) as simulation,
+        Live(simulation, is_paused=True, pace=None) as live,
+        Page(live, viewer=UNHURRIED) as page,
+    ):
+        live.step(90)
+        live.settle()
+        late = Watched(chromium, page)
+        late.wait("player.frame === 90")
+        check(late, alive, 9.0)
+        late.close()
+        live.step(60)
+        live.settle()
+        back = Watched(chromium, page)
+        back.wait("player.frame === 150")
+        check(back, alive, 15.0)
+        live.seek(4.0)
+        live.settle()
+        back.wait("player.frame === 40")
+        check(back, alive, 15.0)
+        live.step(200)
+        live.settle()
+        back.wait("player.status.isOver && player.frame === 200")
+        check(back, alive, 20.0)
+        back.close()
+        assert not late.trouble + back.trouble
+
+
+def check(watched, alive, until):
+    """Compare the curves with the rows up to a time [s]. The batch has a row at the end, too, where nothing changes."""
+    for team, rows in alive.items():
+        shown = watched.tab.evaluate("(team) => player.curve('left', team)", team)
+        changes = [
+            row for i, row in enumerate(rows) if row[0] <= until and (i == 0 or row[1] != rows[i - 1][1])
+        ]
+        assert shown == changes
+
+
+def text(watched, selector):
+    return watched.tab.locator(selector).all_inner_texts()
+
+
+def test_the_numbers_of_a_live_game_are_what_tussle_run_prints_at_that_step(chromium):
+    with (
+        Simulation(guarded_gate(), SEED) as simulation,
+        Live(simulation, is_paused=True, pace=None) as live,
+        Page(live, viewer=UNHURRIED) as page,
+    ):
+        watched = Watched(chromium, page, {"width": 1200, "height": 800})
+        for step in (0, 25, 108, 200, 60):
+            live.seek(0.1 * step)
+            live.settle()
+            watched.wait(f"player.frame === {step} && player.isDrawn && player.status.step === {step}")
+            with Simulation(guarded_gate(), SEED) as alone:
+                alone.step(step)
+                result = alone.result()[0]
+            watched.wait(
+                f"document.querySelector('#metrics').innerText.includes('{result.metrics['Share']['gone']:,.4g}')"
+            )
+            assert [row.split() for row in text(watched, "#teams .team > span:nth-of-type(2)")] == [
+                [str(result.alive[team]), "/", str(result.born[team])] for team in (1, 2)
+            ]
+            scores = [float(row.replace("−", "-")) for row in text(watched, "#scores .score b")]
+            assert scores == pytest.approx(list(result.scores.values()), rel=1e-3)
+            assert dict(zip(text(watched, "#metrics dt"), text(watched, "#metrics dd"), strict=True)) == {
+                "Gate stopped": str(result.metrics["Gate"]["stopped"]),
+                "Gate passed": str(result.metrics["Gate"]["passed"]),
+                "Share gone": f"{result.metrics['Share']['gone']:,.4g}",
+            }
+        watched.close()
+        assert not watched.trouble
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory):
+    base = tmp_path_factory.mktemp("runs")
+    for name, n_prey in (("a", 6), ("b", 9)):
+        mission = hunt(n_prey=n_prey, end=20.0, end_conditions="time")
+        with Simulation(mission, 3) as simulation, Recorder(simulation, base / name):
+            simulation.run()
+    return [Recording(base / name, is_mapped=True) for name in "ab"]
+
+
+@pytest.mark.parametrize("is_over", [True, False])
+def test_two_runs_are_counted_and_named_apart(chromium, runs, is_over):
+    with Page(Comparison(*runs, is_over_each_other=is_over), is_paused=True) as page:
+        watched = Watched(chromium, page, {"width": 1200, "height": 800})
+        for t in (0.0, 3.0, 19.0):
+            watched.tab.locator("#time").evaluate(
+                "(s, t) => { s.value = String(t); s.dispatchEvent(new Event('input')); }", t
+            )
+            watched.wait(f"Math.abs(player.t - {t}) < 1e-6 && player.isDrawn")
+            expected = []
+            for name, run in zip("AB", runs, strict=True):
+                for team, of_team in run.teams.items():
+                    n = int((run.at(t).team == team).sum())
+                    blocks = [run.blocks[i] for i, its in enumerate(run.block_teams) if its == team]
+                    born = sum(e.kind == "birth" and e.t <= t and e.text in blocks for e in run.events)
+                    caught = sum(e.kind == "capture" and e.t <= t for e in run.events) if team == 2 else 0
+                    expected.append([f"{name} {of_team}", f"{n} / {born}", str(caught)])
+            names = text(watched, "#teams .team > span:nth-of-type(1)")
+            assert [list(row) for row in zip(names, text(watched, "#teams .team > span:nth-of-type(2)"),
+                                             text(watched, "#scores .score b"), strict=True)] == expected  # fmt: skip
+        assert text(watched, "#teams h3") == ["A: a", "B: b"]
+        assert "prey.count 6 and 9" in watched.tab.locator("#lead").inner_text()
+        watched.close()
+        assert not watched.trouble
