@@ -1,5 +1,6 @@
 """Curves and numbers of the page in a real browser, compared with what they are of."""
 
+import numpy as np
 import pytest
 from guarded_gate import guarded_gate
 from recorded_games import hunt
@@ -8,6 +9,7 @@ from served import UNHURRIED, Watched
 from tussle import Recorder, Simulation
 from tussle.batch import Batch, InProcess
 from tussle.view import Live, Recording
+from tussle.view.entity import entity_state
 from tussle.view.page.compare import Comparison
 from tussle.view.page.server import Page
 
@@ -127,5 +129,115 @@ def test_two_runs_are_counted_and_named_apart(chromium, runs, is_over):
                                              text(watched, "#scores .score b"), strict=True)] == expected  # fmt: skip
         assert text(watched, "#teams h3") == ["A: a", "B: b"]
         assert "prey.count 6 and 9" in watched.tab.locator("#lead").inner_text()
+        watched.close()
+        assert not watched.trouble
+
+
+def add(watched, name, ids=""):
+    """Add a quantity to the panel, of these entities."""
+    if ids:
+        watched.tab.locator("#ids").fill(ids)
+        watched.tab.locator("#ids").press("Tab")
+    watched.wait(
+        f"[...document.querySelectorAll('#quantity option')].some((o) => o.value.endsWith('\\n' + '{name}'))"
+    )
+    value = watched.tab.evaluate(
+        "(name) => [...document.querySelectorAll('#quantity option')].find((o) => o.value.endsWith('\\n' + name)).value",
+        name,
+    )
+    watched.tab.locator("#quantity").select_option(value)
+
+
+def legend(watched, title):
+    """Label -> value of each line of a plot."""
+    plot = watched.tab.locator("#plots .plot", has=watched.tab.locator("h3", has_text=title))
+    lines = plot.locator("li:visible").all()
+    return {line.locator("span").inner_text(): line.locator("b").inner_text() for line in lines}
+
+
+def amount(value):
+    """A number as the page writes it: four digits."""
+    return f"{value:.4g}".replace("-", "−")
+
+
+def test_any_quantity_of_a_live_game_is_shown_over_time_for_several_entities(chromium):
+    with (
+        Simulation(guarded_gate(), SEED) as simulation,
+        Live(simulation, is_paused=True, pace=None) as live,
+        Page(live, viewer=UNHURRIED) as page,
+    ):
+        live.step(60)
+        live.settle()
+        watched = Watched(chromium, page, {"width": 1200, "height": 800})
+        watched.press("q")
+        add(watched, "March.way", "7 8")
+        add(watched, "yaw")
+        add(watched, "Share.gone")
+        add(watched, "Gate.stopped")
+        add(watched, "score")
+        watched.wait("player.curve('March.way', null, 7).length")
+        live.step(24)
+        live.settle()
+        watched.wait("player.frame === 84 && player.isDrawn")
+        with Simulation(guarded_gate(), SEED) as alone:
+            alone.step(60)
+            ways = {7: [], 8: []}
+            for step in range(60, 85):
+                for who, way in ways.items():
+                    way.append([step * 0.1, entity_state(alone, 0, who).plugins["March"]["way"].value])
+                if step < 84:
+                    alone.step()
+            result = alone.result()[0]
+        for who, way in ways.items():
+            watched.wait(f"player.curve('March.way', null, {who}).length === 25")
+            assert watched.tab.evaluate("(who) => player.curve('March.way', null, who)", who) == [
+                [pytest.approx(t), value] for t, value in way
+            ]
+        watched.wait("player.isDrawn")
+        assert legend(watched, "March.way [m]") == {
+            f"intruder {who}": amount(way[-1][1]) for who, way in ways.items()
+        }
+        assert set(legend(watched, "yaw [°]")) == {"intruder 7", "intruder 8"}
+        assert legend(watched, "Share.gone") == {"Share.gone": amount(result.metrics["Share"]["gone"])}
+        assert legend(watched, "Gate.stopped") == {"Gate.stopped": str(result.metrics["Gate"]["stopped"])}
+        assert legend(watched, "score") == {
+            "guard": amount(result.scores[1]),
+            "intruder": amount(result.scores[2]),
+        }
+        watched.tab.locator("#plots .plot button").first.click()
+        assert watched.tab.locator("#plots .plot").count() == 4
+        watched.until(lambda: not any(name.name == "March.way" for name in live.curves.series))
+        watched.close()
+        assert not watched.trouble
+
+
+def test_columns_of_recorded_entities_are_shown_over_time_for_both_runs(chromium, runs):
+    with Page(Comparison(*runs), is_paused=True) as page:
+        watched = Watched(chromium, page, {"width": 1200, "height": 800})
+        watched.press("q")
+        for name in ("speed", "yaw", "left"):
+            add(watched, name, "2 5")
+        watched.wait("player.curve('yaw', null, 5).length")
+        watched.press("End")
+        for t in (0.0, 3.0):
+            watched.tab.locator("#time").evaluate(
+                "(s, t) => { s.value = String(t); s.dispatchEvent(new Event('input')); }", t
+            )
+            watched.wait(f"Math.abs(player.t - {t}) < 1e-6 && player.isDrawn")
+            speeds = {}
+            for name, run in zip("AB", runs, strict=True):
+                frame = run.at(t)
+                for who in (2, 5):
+                    row = frame.row_of(who)
+                    value = amount(float(np.linalg.norm(frame.vel[row]))) if row >= 0 else "–"
+                    block = next(e.text for e in run.events if e.kind == "birth" and e.id == who)
+                    speeds[f"{name} {block} {who}"] = value
+            assert legend(watched, "speed [m/s]") == speeds
+            assert list(legend(watched, "entities left")) == [
+                "A prey, late",
+                "A hunters",
+                "B prey, late",
+                "B hunters",
+            ]
         watched.close()
         assert not watched.trouble

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tussle.errors import ParameterError
+from tussle.view.curves import numbers_of
 from tussle.view.frame import Event, Frame
 from tussle.view.live import Live
 from tussle.view.page.chunks import FULL_HEALTH, UNIT, pack, step_of
@@ -264,7 +265,10 @@ class FramePublisher:
 
     def _entity(self, reader: Reader) -> dict[str, Any] | None:
         state = self._live.entity(reader.chosen) if reader.chosen else None
-        return None if state is None else {"id": state.id, "sections": entity_sections(state)}
+        if state is None:
+            return None
+        columns = [[name, unit] for name, (_, unit) in numbers_of(state).items()]
+        return {"id": state.id, "sections": entity_sections(state), "columns": columns}
 
     # -- what they send ---------------------------------------------------------------------------------------------------------------
 

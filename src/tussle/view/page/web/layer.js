@@ -26,6 +26,8 @@ export class Layer {
     this.shown = new Moment();
     this.start = 0;
     this.end = 0;
+    /** Names of the results of metrics, interactions and networks. @type {string[]} */
+    this.results = [];
     /** Quantities over time. */
     this.series = new SeriesBook();
     /** A move above this is a jump [m]. */
@@ -52,11 +54,15 @@ export class Layer {
     chunk.id.forEach((id, k) => this.blockOf.set(id, chunk.block[k]));
   }
 
+  /** Number of an entity in its own run. @param {number} id */
+  number(id) {
+    return this.page.idShift && id > this.page.idShift ? id - this.page.idShift : id;
+  }
+
   /** Name of an entity. @param {number} id */
   who(id) {
     const block = this.page.blocks[this.blockOf.get(id)];
-    const number = this.page.idShift && id > this.page.idShift ? id - this.page.idShift : id;
-    return block ? `${block.name} ${number}` : `${number}`;
+    return block ? `${block.name} ${this.number(id)}` : `${this.number(id)}`;
   }
 
   /** @param {number} id */

@@ -18,8 +18,6 @@ export class Live extends Layer {
     this.epoch = -1;
     /** @type {Moment[]} */
     this.past = [];
-    /** Names of the results of metrics, interactions and networks. @type {string[]} */
-    this.results = [];
   }
 
   get mostAtOnce() {

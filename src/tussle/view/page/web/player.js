@@ -11,6 +11,7 @@ import { TRAIL_LENGTHS, TRAIL_OF_CHOSEN } from './trails.js';
 import { EventLine } from './events.js';
 import { LiveClock, RecordedClock } from './timeline.js';
 import { Panels } from './panels.js';
+import { QuantityPanel } from './quantities.js';
 import { Steering } from './steering.js';
 import { Viewpoint } from './viewpoint.js';
 import { fillHelp, listen } from './keys.js';
@@ -75,6 +76,7 @@ export class Player {
     this.clock = layer instanceof Live ? new LiveClock(layer, source) : new RecordedClock(layer, page);
     this.events = new EventLine(layer, this.clock, (event) => this.jump(event));
     this.panels = new Panels(page, layer, this.hidden, () => this.look());
+    this.quantities = new QuantityPanel(this);
     this.steering = new Steering(this.canvas, this);
     drawn.labels = layer.mostAtOnce <= FEW.labels;
     drawn.trail = page.hasTrails || layer.mostAtOnce <= FEW.trails ? TRAIL_LENGTHS.indexOf(page.hasTrails ? 10 : 5) : 0;
@@ -228,6 +230,7 @@ export class Player {
     this.picture.draw();
     this.panels.showTeams(clock.t);
     this.panels.showChosen(this.chosen, this.camera.mode, clock.t);
+    this.quantities.show(clock.t);
     this.events.update(clock.t);
     clock.show(clock.t, clock.isPlaying, clock.speed);
     this.showButtons();
