@@ -127,6 +127,21 @@ def test_two_runs_are_counted_and_named_apart(chromium, runs, is_over):
             names = text(watched, "#teams .team > span:nth-of-type(1)")
             assert [list(row) for row in zip(names, text(watched, "#teams .team > span:nth-of-type(2)"),
                                              text(watched, "#scores .score b"), strict=True)] == expected  # fmt: skip
+        n_entities = [len({e.id for e in run.events if e.kind == "birth"}) for run in runs]
+        assert "{} and {} entities".format(*n_entities) in watched.tab.locator("#subtitle").inner_text()
+        frame, row = runs[1].at(19.0), -1
+        who = int(frame.id[row])
+        watched.tab.locator("#quantities #ids").evaluate(
+            "(field, id) => { field.value = String(id); field.dispatchEvent(new Event('change')); }",
+            who + page.game.id_shift,
+        )
+        watched.wait(f"player.chosen === {who + page.game.id_shift} && player.isDrawn")
+        facts = dict(zip(text(watched, "#chosen > dl dt"), text(watched, "#chosen > dl dd"), strict=True))
+        assert facts["Team"] == f"{frame.team[row]} B {runs[1].teams[int(frame.team[row])]}"
+        for name, coordinate in zip(("East", "North", "Up"), frame.pos[row], strict=True):
+            assert float(facts[name].removesuffix(" m").replace("−", "-")) == pytest.approx(
+                coordinate, abs=0.06
+            )
         assert text(watched, "#teams h3") == ["A: a", "B: b"]
         assert "prey.count 6 and 9" in watched.tab.locator("#lead").inner_text()
         watched.close()
@@ -153,6 +168,26 @@ def legend(watched, title):
     plot = watched.tab.locator("#plots .plot", has=watched.tab.locator("h3", has_text=title))
     lines = plot.locator("li:visible").all()
     return {line.locator("span").inner_text(): line.locator("b").inner_text() for line in lines}
+
+
+def drawn_shares(watched, title, heights):
+    """Share of the columns of a plot that have pixels of a line at some heights, given as shares of its axis."""
+    canvas = watched.tab.locator("#plots .plot", has=watched.tab.locator("h3", has_text=title)).locator(
+        "canvas"
+    )
+    return canvas.evaluate(
+        """(canvas, heights) => {
+            const { width } = canvas;
+            const ratio = canvas.height / canvas.clientHeight;
+            const { data } = canvas.getContext('2d').getImageData(0, 0, width, canvas.height);
+            return heights.map((height) => {
+                const row = Math.round(ratio * (canvas.clientHeight - 16 - height * (canvas.clientHeight - 24)));
+                const opacity = (x) => Math.max(...[row - 1, row].map((y) => data[4 * (y * width + x) + 3]));
+                return Array.from({ length: width }, (_, x) => opacity(x)).filter((value) => value > 150).length / width;
+            });
+        }""",
+        heights,
+    )
 
 
 def amount(value):
@@ -204,6 +239,11 @@ def test_any_quantity_of_a_live_game_is_shown_over_time_for_several_entities(chr
             "guard": amount(result.scores[1]),
             "intruder": amount(result.scores[2]),
         }
+        # One step, at 7.1 s of 8.4 s, and no slope.
+        low, middle, high = drawn_shares(watched, "Gate.stopped", [0.0, 0.5, 1.0])
+        assert low > 0.7
+        assert middle < 0.06
+        assert 0.1 < high < 0.25
         watched.tab.locator("#plots .plot button").first.click()
         assert watched.tab.locator("#plots .plot").count() == 4
         watched.until(lambda: not any(name.name == "March.way" for name in live.curves.series))

@@ -130,9 +130,10 @@ class GameCurves:
             self._set(CurveName("score", team), step, score)
         for plugin, named in result.metrics.items():
             for name, value in named.items():
-                for team, number in value.items() if isinstance(value, dict) else [(None, value)]:
+                by_team: dict[int | None, Any] = value if isinstance(value, dict) else {None: value}
+                for key, number in by_team.items():
                     if isinstance(number, (bool, int, float)):
-                        self._set(CurveName(f"{plugin}.{name}", team), step, float(number))
+                        self._set(CurveName(f"{plugin}.{name}", key), step, float(number))
 
     def _read_entities(self, step: int) -> None:
         """Read columns of the entities that are watched; they are NaN while an entity does not exist."""

@@ -81,10 +81,12 @@ class RecordedData:
         self._scenery = scenery_blobs(game.scenery)
 
     @property
-    def n_entities(self) -> int:
-        """Number of entities over the whole run."""
-        first = set(self._game.frame(0).id.tolist())
-        return len(first | {event.id for event in self._game.events if event.kind == "birth"})
+    def n_entities(self) -> list[int]:
+        """Number of entities over each whole run."""
+        return [
+            len({*run.frame(0).id.tolist(), *(event.id for event in run.events if event.kind == "birth")})
+            for run, _, _ in self._runs
+        ]
 
     def document(self, **more: Any) -> dict[str, Any]:
         """Return the document.
@@ -100,10 +102,14 @@ class RecordedData:
                 grouped(len(self.kept))
                 + (f" of {grouped(len(game.t))}, one every {self._period:g} s" if self._period else ""),
             ),
-            ("Entities", f"{grouped(self.n_entities)}, in {grouped(int(self.counts.sum()))} states"),
+            (
+                "Entities",
+                f"{' and '.join(map(grouped, self.n_entities))}, in {grouped(int(self.counts.sum()))} states",
+            ),
         ]
         if isinstance(game, Comparison):
-            more = {"runs": comparison_data(game), "signs": game.signs, "differing": game.differing} | more
+            more |= {"runs": comparison_data(game), "shift": game.shift.tolist(), "signs": game.signs}
+            more |= {"differing": game.differing}
         return {
             **game_document(game, self._mission, self._viewer, self._title),
             "source": "embedded" if self._is_file else "range",
@@ -230,9 +236,14 @@ def chunk_bounds(counts: np.ndarray, n_states: int, least_frames: int) -> list[t
 
 
 def comparison_data(game: Comparison) -> list[dict[str, Any]]:
-    """Return name, directory and teams of each of two runs."""
+    """Return name, directory, teams and what their numbers have been raised by, of each of two runs."""
     return [
-        {"name": name, "title": run.path.resolve().name, "teams": [team + shift for team in run.teams]}
+        {
+            "name": name,
+            "title": run.path.resolve().name,
+            "teams": [team + shift for team in run.teams],
+            "teamShift": shift,
+        }
         for name, run, shift in (("A", game.a, 0), ("B", game.b, game.team_shift))
     ]
 

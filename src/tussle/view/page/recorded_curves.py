@@ -56,7 +56,7 @@ def _left(run: Recording) -> Iterable[Changes]:
     is_changed = np.diff(run.counts, prepend=-1) != 0
     times = [e.t for e in run.events if e.kind in ("birth", "death")]
     for side in ("left", "right"):
-        places = np.searchsorted(run.t, times, side=side)  # type: ignore[call-overload]
+        places = np.searchsorted(run.t, times, side=side)
         is_changed[places[places < run.n_frames]] = True
     frames = np.flatnonzero(is_changed)
     counts = np.array([[(run.team_column(int(i)) == team).sum() for team in run.teams] for i in frames])

@@ -2,7 +2,7 @@
 /** @import { Mode, PageData, Status, Team } from './types' */
 
 import { amount, byId, cleared, element, fillList, length, number, rgb, say, styled } from './formatting.js';
-import { between, forward, norm } from './geometry.js';
+import { between, forward, minus, norm } from './geometry.js';
 import { NO_TEAM } from './layer.js';
 import { Live } from './live.js';
 import { Recorded } from './recorded.js';
@@ -43,7 +43,7 @@ export class Panels {
     say(document.querySelector('#head h1'), page.title);
     if (!this.status) {
       const seed = page.facts.find(([name]) => name === 'Seed')?.[1];
-      const n = `${number(page.nEntities)} ${page.nEntities === 1 ? 'entity' : 'entities'}`;
+      const n = `${page.nEntities.map((each) => number(each)).join(' and ')} ${String(page.nEntities) === '1' ? 'entity' : 'entities'}`;
       const seconds = `${number(layer.end - layer.start, 1).replace(/\.0$/, '')} s`;
       say(byId('subtitle'), [seed && `seed ${seed}`, n, seconds].filter(Boolean).join(' · '));
     }
@@ -133,7 +133,7 @@ export class Panels {
     this.teams.forEach(({ team, count, most, curve }, i) => {
       say(count, number(left[i].at(t) || 0));
       say(most, ` / ${number(series.of('born', team.id).at(t) || 0)}`);
-      this.drawCurve(curve, left[i], [0, left[i].range([1])[1]], t, team);
+      this.drawCurve(curve, left[i], [0, left[i].range([0, 1])[1]], t, team);
     });
     const scores = this.scores.map(({ team }) => series.of(scored, team.id));
     const range = scores.reduce((sum, each) => each.range(sum), [0, 1e-9]);
@@ -201,12 +201,13 @@ export class Panels {
 
   /** @param {number} id @param {number} t @returns {[string, string][]} */
   factsOf(id, t) {
-    const { layer } = this;
+    const { layer, page } = this;
     const slot = layer.slotOf(id);
     const team = slot >= 0 ? layer.teams.get(layer.shown.team[slot]) || NO_TEAM : layer.teamOf(id);
+    const { teamShift } = page.runs?.find(({ teams }) => teams.includes(team.id)) || { teamShift: 0 };
     const nCaptures = layer.events.filter((event) => event.kind === 'capture' && event.id === id && event.t <= t).length;
     return [
-      ['Team', `${team.id} ${team.name}`.trim()],
+      ['Team', `${team.id - teamShift} ${team.name}`.trim()],
       ...(slot >= 0 ? this.stateOf(slot) : [this.absence(id, t)]),
       .../** @type {[string, string][]} */ (nCaptures ? [['Captures', `${nCaptures}`]] : []),
     ];
@@ -224,8 +225,9 @@ export class Panels {
 
   /** @param {number} slot @returns {[string, string][]} */
   stateOf(slot) {
-    const { shown } = this.layer;
-    const [east, north, up] = shown.placeIn(slot);
+    const { layer: { shown }, page } = this;
+    const isSecond = page.shift && shown.id[slot] > page.idShift;
+    const [east, north, up] = minus(shown.placeIn(slot), isSecond ? page.shift : [0, 0, 0]);
     const nose = forward(shown.quat.subarray(4 * slot, 4 * slot + 4));
     const heading = ((Math.atan2(nose[1], nose[0]) * 180) / Math.PI + 360) % 360;
     const health = shown.health[slot];

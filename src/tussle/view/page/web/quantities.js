@@ -90,16 +90,17 @@ export class QuantityPanel {
     if (group === 'column' && !ids.length) return player.say('Click an entity, or write its number in the field');
     const unit = this.columns().find(([each]) => each === name)?.[1] || '';
     const plot = this.plots.find((each) => each.name === name) || this.makePlot(name, OF_TEAMS.find(([each]) => each === name)?.[1] || name, unit);
-    const runs = page.runs || [{ name: '', title: '', teams: [] }];
+    const teamsOfSecond = page.runs?.[1].teams || [];
     if (group !== 'column') {
       if (layer.series.has(name) || !page.teams.some(({ id }) => layer.series.has(name, id))) this.addLine(plot, { label: name, colour: styled('--ink'), isDashed: false, team: null, id: 0 });
       for (const { id, name: label, colour } of page.teams) {
-        this.addLine(plot, { label: label || `team ${id}`, colour: rgb(colour), isDashed: Boolean(runs[1]?.teams.includes(id)), team: id, id: 0 });
+        this.addLine(plot, { label: label || `team ${id}`, colour: rgb(colour), isDashed: teamsOfSecond.includes(id), team: id, id: 0 });
       }
     }
     for (const id of ids) {
       const colour = COLOURS[(new Set(plot.lines.map((line) => line.colour))).size % COLOURS.length];
-      runs.forEach((_, i) => this.addLine(plot, { label: '', colour, isDashed: i > 0, team: null, id: id + i * page.idShift }));
+      this.addLine(plot, { label: '', colour, isDashed: false, team: null, id });
+      if (page.runs) this.addLine(plot, { label: '', colour, isDashed: true, team: null, id: id + page.idShift });
     }
     this.ask();
     player.look();
@@ -170,8 +171,9 @@ export class QuantityPanel {
       say(row.children[1], label || layer.who(id));
       say(value, amount(factor * series.at(t)));
     }
-    const range = shown.reduce((sum, { series }) => series.range(sum), [Infinity, -Infinity]);
-    if (canvas.clientWidth) this.draw(canvas, shown, range[0] <= range[1] ? range : [0, 1], t, factor);
+    const counted = ['left', 'born', 'captures'].includes(name) ? [0, 1] : [Infinity, -Infinity];
+    const range = shown.reduce((sum, { series }) => series.range(sum), counted);
+    if (canvas.clientWidth) this.draw(canvas, shown, range[0] <= range[1] ? range : [0, 0], t, factor);
   }
 
   /**
@@ -182,12 +184,14 @@ export class QuantityPanel {
     const { start, end } = this.player.layer;
     const pen = cleared(canvas);
     const [width, height] = [canvas.clientWidth, canvas.clientHeight];
-    const [least, most] = low < high ? [low, high] : [low - 0.5, high + 0.5];
-    const x = (/** @type {number} */ time) => 3 + ((time - start) / (end - start || 1)) * (width - 8);
-    const y = (/** @type {number} */ value) => height - 16 - ((value - least) / (most - least)) * (height - 24);
+    const [least, most] = low < high ? [low, high] : [low, low + 1];
     pen.font = `11px ${getComputedStyle(document.body).fontFamily}`;
+    const labels = [most, least].map((value) => amount(factor * value));
+    const left = 8 + Math.max(...labels.map((text) => pen.measureText(text).width));
+    const x = (/** @type {number} */ time) => left + ((time - start) / (end - start || 1)) * (width - left - 4);
+    const y = (/** @type {number} */ value) => height - 16 - ((value - least) / (most - least)) * (height - 24);
     pen.strokeStyle = styled('--line');
-    for (const level of [8, height - 16]) pen.strokeRect(0, level, width, 0);
+    for (const level of [8, height - 16]) pen.strokeRect(left, level, width - left, 0);
     pen.strokeStyle = styled('--muted');
     pen.strokeRect(x(t), 8, 0, height - 24);
     for (const { series, colour, isDashed } of lines) {
@@ -202,11 +206,12 @@ export class QuantityPanel {
     }
     pen.setLineDash([]);
     pen.fillStyle = styled('--muted');
-    pen.fillText(amount(factor * most), 2, 6 + 12);
-    pen.fillText(amount(factor * least), 2, height - 19);
-    pen.fillText(`${amount(start)} s`, 2, height - 3);
+    pen.textAlign = 'left';
+    pen.fillText(`${amount(start)} s`, left, height - 3);
     pen.textAlign = 'right';
     pen.fillText(`${amount(end)} s`, width - 2, height - 3);
+    pen.fillText(labels[0], left - 4, 12);
+    pen.fillText(labels[1], left - 4, height - 13);
   }
 }
 

@@ -17,9 +17,8 @@ export class Series {
     return this.v[lastNotAfter(this.t, t)] ?? NaN;
   }
 
-  /** The least and the largest of some numbers and of all values. @param {number[]} others @returns {[number, number]} */
-  range(others = []) {
-    let [low, high] = [Math.min(...others), Math.max(...others)];
+  /** The least and the largest value, and of a range. @param {number[]} others @returns {[number, number]} */
+  range([low, high] = [Infinity, -Infinity]) {
     for (const value of this.v) {
       if (value < low) low = value;
       if (value > high) high = value;

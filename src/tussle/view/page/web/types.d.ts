@@ -27,8 +27,8 @@ export interface PageData {
   reach: number; angle: number; scale: number; hasTrails: boolean; notes: string[]; facts: [string, string][]; idShift: number;
   isComplete: boolean; attitudeUnit: number; healthSteps: number;
   // Of a recorded run.
-  nFrames?: number; nStates?: number; nEntities?: number; mostAtOnce?: number; chunks?: [number, number][]; positionError?: number;
-  angleError?: number; begins?: number; runs?: { name: string; title: string; teams: number[] }[]; signs?: [string, Vector][]; differing?: [string, string, string][]; columns?: [string, string][];
+  nFrames?: number; nStates?: number; nEntities?: number[]; mostAtOnce?: number; chunks?: [number, number][]; positionError?: number;
+  angleError?: number; begins?: number; runs?: { name: string; title: string; teams: number[]; teamShift: number }[]; shift?: Vector; signs?: [string, Vector][]; differing?: [string, string, string][]; columns?: [string, string][];
   warp?: number | null; isPlaying?: boolean; lead?: string; shapeFrames?: number;
   // Of a live game.
   seed?: number;
