@@ -3,7 +3,8 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { Chunk, Moment } from '../../src/tussle/view/page/web/chunk.js';
-import { lastNotAfter, lastWhere, Layer } from '../../src/tussle/view/page/web/layer.js';
+import { Layer } from '../../src/tussle/view/page/web/layer.js';
+import { lastNotAfter, lastWhere } from '../../src/tussle/view/page/web/ordered.js';
 import { SeriesBook, steps } from '../../src/tussle/view/page/web/series.js';
 import { Live } from '../../src/tussle/view/page/web/live.js';
 import { Recorded } from '../../src/tussle/view/page/web/recorded.js';

@@ -267,8 +267,8 @@ class FramePublisher:
         state = self._live.entity(reader.chosen) if reader.chosen else None
         if state is None:
             return None
-        columns = [[name, unit] for name, (_, unit) in numbers_of(state).items()]
-        return {"id": state.id, "sections": entity_sections(state), "columns": columns}
+        quantities = [[name, unit] for name, (_, unit) in numbers_of(state).items()]
+        return {"id": state.id, "sections": entity_sections(state), "quantities": quantities}
 
     # -- what they send ---------------------------------------------------------------------------------------------------------------
 

@@ -114,7 +114,7 @@ class RecordedData:
             **game_document(game, self._mission, self._viewer, self._title),
             "source": "embedded" if self._is_file else "range",
             "facts": facts,
-            "columns": [] if self._is_file else list(COLUMNS.items()),
+            "quantities": [] if self._is_file else list(COLUMNS.items()),
             "idShift": game.id_shift,
             "isComplete": game.is_complete,
             "nFrames": len(self.kept),

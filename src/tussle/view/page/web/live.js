@@ -2,7 +2,8 @@
 /** @import { Change, EventRow, PageData, Sample, Status } from './types' */
 
 import { Chunk, Moment } from './chunk.js';
-import { lastWhere, Layer } from './layer.js';
+import { Layer } from './layer.js';
+import { lastWhere } from './ordered.js';
 
 /** States of past frames that are kept; of more, every other frame goes. */
 const MOST_PAST = 1e6;

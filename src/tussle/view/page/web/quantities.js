@@ -54,8 +54,8 @@ export class QuantityPanel {
   /** Columns of the chosen entity, with their units. @returns {[string, string][]} */
   columns() {
     const { layer, page, chosen } = this.player;
-    if (!(layer instanceof Live)) return page.columns;
-    return layer.status.entity?.id === chosen ? layer.status.entity.columns : [];
+    if (!(layer instanceof Live)) return page.quantities;
+    return layer.status.entity?.id === chosen ? layer.status.entity.quantities : [];
   }
 
   /** Offer what there is. */

@@ -4,7 +4,8 @@
 import { between } from './geometry.js';
 import { Reader, readMessage } from './packing.js';
 import { Chunk } from './chunk.js';
-import { lastNotAfter, lastWhere, Layer } from './layer.js';
+import { Layer } from './layer.js';
+import { lastNotAfter, lastWhere } from './ordered.js';
 
 /** States that are kept unpacked, at some 45 bytes each; the chunks that were used last stay. */
 const MOST_STATES = 4e6;

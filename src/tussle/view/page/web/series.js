@@ -1,7 +1,7 @@
 // Quantities over time: each keeps its value until its next change. They come from the server, or with the page, as lists of changes.
 /** @import { Change } from './types' */
 
-import { lastNotAfter } from './layer.js';
+import { lastNotAfter } from './ordered.js';
 
 /** A quantity: values that hold from times on; NaN where it is not known. */
 export class Series {

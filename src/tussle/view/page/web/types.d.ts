@@ -28,7 +28,7 @@ export interface PageData {
   isComplete: boolean; attitudeUnit: number; healthSteps: number;
   // Of a recorded run.
   nFrames?: number; nStates?: number; nEntities?: number[]; mostAtOnce?: number; chunks?: [number, number][]; positionError?: number;
-  angleError?: number; begins?: number; runs?: { name: string; title: string; teams: number[]; teamShift: number }[]; shift?: Vector; signs?: [string, Vector][]; differing?: [string, string, string][]; columns?: [string, string][];
+  angleError?: number; begins?: number; runs?: { name: string; title: string; teams: number[]; teamShift: number }[]; shift?: Vector; signs?: [string, Vector][]; differing?: [string, string, string][]; quantities?: [string, string][];
   warp?: number | null; isPlaying?: boolean; lead?: string; shapeFrames?: number;
   // Of a live game.
   seed?: number;
@@ -38,7 +38,7 @@ export interface PageData {
 export interface Status {
   t: number; step: number; span: [number, number]; epoch: number; seed: number; isPaused: boolean; isOver: boolean; isSeeking: boolean;
   warp: number | null; reached: number; rate: number; notes: string[]; error: string | null;   metrics: [string, string][]; events: { from: number; rows: EventRow[] }; refusal: string | null; steers: boolean;
-  entity: { id: number; sections: [string, [string, string][]][]; columns: [string, string][] } | null;
+  entity: { id: number; sections: [string, [string, string][]][]; quantities: [string, string][] } | null;
 }
 
 /** Shapes of plugins, see drawing.py. */
