@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from guarded_gate import guarded_gate
-from recorded_games import hunt
+from recorded_games import hunt, record
 from served import UNHURRIED, Watched
 
 from tussle import Recorder, Simulation
@@ -279,5 +279,37 @@ def test_columns_of_recorded_entities_are_shown_over_time_for_both_runs(chromium
                 "B prey, late",
                 "B hunters",
             ]
+        watched.close()
+        assert not watched.trouble
+
+
+def test_recorded_results_of_two_runs_are_shown_as_they_stood(chromium, tmp_path):
+    seeds = (SEED, SEED + 1)
+    for seed in seeds:
+        record(guarded_gate(), tmp_path / str(seed), (seed,), results=True)
+    pair = Comparison(*(Recording(tmp_path / str(seed)) for seed in seeds))
+    with Page(pair, is_paused=True) as page:
+        watched = Watched(chromium, page, {"width": 1200, "height": 800})
+        watched.press("q")
+        add(watched, "Gate.stopped")
+        for step in (79, 200):
+            watched.tab.locator("#time").evaluate(
+                "(s, t) => { s.value = String(t); s.dispatchEvent(new Event('input')); }", 0.1 * step
+            )
+            watched.wait(f"Math.abs(player.t - {0.1 * step}) < 1e-6 && player.isDrawn")
+            results = []
+            for seed in seeds:
+                with Simulation(guarded_gate(), seed) as alone:
+                    alone.step(step)
+                    results.append(alone.result()[0])
+            scores = [amount(score) for result in results for score in result.scores.values()]
+            assert text(watched, "#scores .score b") == scores
+            stopped, passed = (
+                [result.metrics["Gate"][name] for result in results] for name in ("stopped", "passed")
+            )
+            shown = dict(zip(text(watched, "#metrics dt"), text(watched, "#metrics dd"), strict=True))
+            assert shown["Gate stopped"] == "A {}, B {}".format(*stopped)
+            assert shown["Gate passed"] == "A {}, B {}".format(*passed)
+            assert legend(watched, "Gate.stopped") == dict(zip("AB", map(str, stopped), strict=True))
         watched.close()
         assert not watched.trouble

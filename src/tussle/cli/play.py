@@ -63,6 +63,7 @@ def record(
     loaded: Loaded,
     period: float | None = None,
     shapes: bool = False,
+    results: bool = False,
 ) -> Recorder:
     """Return a recorder of a simulation.
 
@@ -73,7 +74,7 @@ def record(
 
     return Recorder(
         simulation, directory, period=period, mission_text=loaded.text, parameters=loaded.settings, shapes=shapes,
-        scene_files=loaded.scene_files, mission_notes=loaded.game_notes,
+        results=results, scene_files=loaded.scene_files, mission_notes=loaded.game_notes,
     )  # fmt: skip
 
 
@@ -212,7 +213,9 @@ def run(options: RunOptions) -> int:
             simulation.state.context.is_interrupted = lambda: bool(interrupt.code)
             if not options.no_log:
                 directory = options.directory or _new_directory(name, seed)
-                recorder = record(simulation, directory, loaded, options.log_period, options.shapes)
+                recorder = record(
+                    simulation, directory, loaded, options.log_period, options.shapes, options.results
+                )
             if recorder is not None:
                 stack.push(partial(_close_interrupted, recorder))
             simulation.step()  # loads or compiles kernels, so it counts as preparation

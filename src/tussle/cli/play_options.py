@@ -46,6 +46,9 @@ class RunOptions(MissionOptions):
         float | None, option("S", "Time between recorded states [s]; by default every step.")
     ] = None
     shapes: Annotated[bool, flag("--shapes", "Record the shapes that plugins draw, too.")] = False
+    results: Annotated[
+        bool, flag("--results", "Record scores and results after each step, too, for curves in replays.")
+    ] = False
     pace: Annotated[
         float | None,
         option("X", "Play at most X times as fast as real time. The result does not change."),
@@ -56,9 +59,10 @@ class RunOptions(MissionOptions):
     ] = None
 
     def __post_init__(self) -> None:
-        if self.no_log and (self.directory is not None or self.log_period is not None or self.shapes):
+        recorded = (self.directory is not None, self.log_period is not None, self.shapes, self.results)
+        if self.no_log and any(recorded):
             raise typer.BadParameter(
-                "--no-log records nothing, so --out, --log-period and --shapes are not allowed with it"
+                "--no-log records nothing, so --out, --log-period, --shapes and --results are not allowed with it"
             )
         check_positive(pace=self.pace, log_period=self.log_period)
         is_changed = self.mission or self.more or self.settings or self.plugin_files

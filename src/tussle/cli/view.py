@@ -41,7 +41,9 @@ def view(options: ViewOptions) -> int:
         recorder = None
         if options.record is not None:
             # Closed last, however the game ends.
-            recorder = stack.enter_context(record(simulation, options.record, loaded, shapes=True))
+            recorder = stack.enter_context(
+                record(simulation, options.record, loaded, shapes=True, results=True)
+            )
         live = Live(
             simulation,
             pace=_pace_of(viewer) if options.pace is None else options.speed,

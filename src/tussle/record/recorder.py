@@ -17,6 +17,7 @@ from tussle.errors import MissionError, ParameterError, RecordError
 from tussle.mission import to_xml
 from tussle.record import run_file
 from tussle.record.events import BIRTH, END, Events
+from tussle.record.results import ResultRows
 from tussle.record.row_buffer import RowBuffer, RowSelection
 from tussle.record.schema import (
     EVENTS,
@@ -25,6 +26,8 @@ from tussle.record.schema import (
     LINKS,
     LINKS_FILE,
     MISSION_FILE,
+    RESULTS,
+    RESULTS_FILE,
     SHAPES,
     SHAPES_FILE,
     TRAJECTORY,
@@ -34,6 +37,8 @@ from tussle.record.shapes import ShapeRows
 from tussle.record.stream import Stream
 from tussle.record.traffic import Traffic, check_file_names
 
+MOST_RESULTS = 100_000
+"""Changes of results that are collected between two flushes."""
 MOST_LETTERS = 4_000_000
 """Characters of shapes that are collected between two flushes."""
 
@@ -50,7 +55,7 @@ class Recorded(Protocol):
     @property
     def grade(self) -> str: ...
 
-    def result(self) -> list[Any]: ...
+    def result(self, *, is_hashed: bool = True) -> list[Any]: ...
 
 
 class Recorder:
@@ -69,6 +74,7 @@ class Recorder:
         mission_notes: Notes about the mission file, for `run.json`, see `tussle.mission.Loaded`.
         flush_every: Wall time between flushes [s].
         shapes: Whether the shapes that plugins draw are recorded, too; of every step, whatever the period.
+        results: Whether scores and results of metrics, interactions and networks are recorded after each step, whatever the period.
         scene_files: Files of terrain, meshes and textures that the mission's text names, which are copied, by name: see
             `tussle.mission.Loaded`.
 
@@ -88,6 +94,7 @@ class Recorder:
         mission_notes: Sequence[str] = (),
         flush_every: float = 1.0,
         shapes: bool = False,
+        results: bool = False,
         scene_files: Mapping[str, Path] | None = None,
     ) -> None:
         for name, value in (("period", period), ("flush_every", flush_every)):
@@ -112,11 +119,13 @@ class Recorder:
         self._common_step = -1
         self._steps = np.full(sim.n_worlds, -1, np.int64)
         self._others: list[str] = []
-        self._open(mission_text, shapes, scene_files or {})
+        self._open(mission_text, shapes, results, scene_files or {})
         self._flush_at = time.monotonic() + flush_every
         self._begin()
 
-    def _open(self, mission_text: str | None, shapes: bool, scene_files: Mapping[str, Path]) -> None:
+    def _open(
+        self, mission_text: str | None, shapes: bool, results: bool, scene_files: Mapping[str, Path]
+    ) -> None:
         try:
             self.directory.mkdir(parents=True, exist_ok=True)
             held = [name for name in FILES if (self.directory / name).exists()]
@@ -148,6 +157,10 @@ class Recorder:
                 Stream(self.directory / SHAPES_FILE, SHAPES),
             )
             self._streams.append(self._shape_stream)
+        self._results = ResultRows(self.sim) if results else None
+        if results:
+            self._result_stream = Stream(self.directory / RESULTS_FILE, RESULTS)
+            self._streams.append(self._result_stream)
         self._traffic = Traffic(self.sim.mission.networks, self.directory, self.sim.n_worlds)
 
     def _written_back(self) -> str:
@@ -177,6 +190,8 @@ class Recorder:
 
     def _observe(self, sim: Recorded) -> None:
         """Record the states at the beginning of a step, if it is due."""
+        if self._results:
+            self._results.read()
         clock = sim.state.context.clock
         step = clock.common
         if step < 0:
@@ -195,7 +210,9 @@ class Recorder:
                 if bodies.ints is not self._rows_source:
                     self._rows_source, self._rows = bodies.ints, RowSelection(bodies.ints)
                 self._add(bodies.floats, self._rows, step)
-        if time.monotonic() >= self._flush_at or (self._shapes and self._shapes.n_letters > MOST_LETTERS):
+        n_letters = self._shapes.n_letters if self._shapes else 0
+        n_results = self._results.n if self._results else 0
+        if time.monotonic() >= self._flush_at or n_letters > MOST_LETTERS or n_results > MOST_RESULTS:
             self.flush()
 
     def _observe_apart(self, sim: Recorded) -> None:
@@ -251,6 +268,8 @@ class Recorder:
             self._write(self._trajectory, self._buffer.take())
         if self._shapes and (drawn := self._shapes.take()):
             self._write(self._shape_stream, drawn)
+        if self._results and (changes := self._results.take()):
+            self._write(self._result_stream, changes)
         self._flush_at = time.monotonic() + self.flush_every
 
     def _take_events(self) -> pa.RecordBatch:
@@ -285,6 +304,8 @@ class Recorder:
         self.is_closed = True
         self._detach()
         sim, step = self.sim, self.sim.state.context.clock.step
+        if self._results:
+            self._results.read()
         last = np.maximum(self._steps, self._common_step)
         unrecorded = sim.state.running & (step > last)
         if unrecorded.any():

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pyarrow as pa
+import pyarrow.compute as pc
 
 from tussle.api.draw import KINDS
 from tussle.errors import RecordError, TussleError
@@ -355,6 +356,17 @@ class Recording:
         rows = [mine[name].to_pylist() for name in ("t", "kind", "id", "other", "text")]
         found = [Event(*row) for row in zip(*rows, strict=True)]
         return sorted(found, key=lambda event: event.t)
+
+    @cached_property
+    def results(self) -> dict[tuple[str, int | None], tuple[list[float], list[float]]]:
+        """Name and team of each score and result that was recorded -> times of its changes [s], and values."""
+        found: dict[tuple[str, int | None], tuple[list[float], list[float]]] = {}
+        table = self.run.results_table
+        for row in table.filter(pc.equal(table["world"], self.world)).to_pylist():
+            t, values = found.setdefault((row["name"], row["team"]), ([], []))
+            t.append(row["t"])
+            values.append(row["value"])
+        return found
 
     # -- shapes of plugins ------------------------------------------------------------------------------------------------------
 

@@ -11,7 +11,7 @@ from page_client import PageClient
 from recorded_games import hunt, record
 from watched_plugins import clickable
 
-from tussle import Simulation
+from tussle import Recorder, Simulation, load_run
 from tussle.api import Metric
 from tussle.messages import CustomKeyPress
 from tussle.view import Live, Recording, timeline
@@ -298,6 +298,70 @@ def test_recorded_curves_are_the_entities_of_each_frame_and_the_events_so_far(ru
     for times, values in curves.values():
         assert (np.diff(times) > 0).all()
         assert (np.diff(values) != 0).all()
+
+
+def test_recorded_results_are_those_after_each_step_of_every_world(tmp_path):
+    seeds, mission = (5, 6), guarded_gate()
+    record(mission, tmp_path / "run", seeds, results=True, period=3.0)
+    hashes = [world["state_hash"] for world in load_run(tmp_path / "run").info["worlds"]]
+    assert hashes == [result.state_hash for result in Simulation(mission, seeds=list(seeds)).run()]
+    assert load_run(tmp_path / "run").is_complete
+    for world, seed in enumerate(seeds):
+        found = Recording(tmp_path / "run", world).results
+        for step, result in steps_of(mission, seed):
+            expected = {("score", team): n for team, n in result.scores.items()}
+            for plugin, named in result.metrics.items():
+                for name, value in named.items():
+                    by_team = value if isinstance(value, dict) else {None: value}
+                    expected |= {(f"{plugin}.{name}", team): v for team, v in by_team.items()}
+            assert {key: value_at(curve, result.t) for key, curve in found.items()} == expected, step
+        assert len(found["Gate.passed", None][0]) == 1 + result.metrics["Gate"]["passed"]
+    shown = changes_in(RecordedData(Recording(tmp_path / "run"), is_file=True))
+    assert {
+        name: [list(part) for part in shown[*name, 0]] for name in [("score", 2), ("Share.gone", None)]
+    } == {
+        name: [list(part) for part in Recording(tmp_path / "run").results[name]]
+        for name in [("score", 2), ("Share.gone", None)]
+    }
+
+
+def test_results_of_a_run_that_is_not_closed_are_there(tmp_path):
+    with Simulation(guarded_gate(), 5) as simulation:
+        recorder = Recorder(simulation, tmp_path / "run", results=True)
+        simulation.step(50)
+        recorder.flush()
+        run = Recording(tmp_path / "run")
+        assert run.results["score", 1][1][-1] == -0.125 * 49
+        assert Recording(record(clickable(end=1.0), tmp_path / "none")).results == {}
+
+
+class NotYet(Metric):
+    """Results that cannot be made after a while."""
+
+    def step(self, w):
+        pass
+
+    def result(self, w):
+        return {"n": 1 / (w.step_count != 5)} if w.step_count[0] != 5 else {"n": 1 // 0}
+
+
+def test_results_that_fail_end_their_recording_and_not_the_run(tmp_path):
+    with (
+        Simulation(clickable(end=2.0, metrics=[NotYet()]), 1) as simulation,
+        pytest.warns(RuntimeWarning, match="results are recorded no longer"),
+        Recorder(simulation, tmp_path / "run", results=True),
+    ):
+        simulation.run()
+    run = Recording(tmp_path / "run")
+    assert run.is_complete
+    assert run.results["NotYet.n", None] == ([0.0], [1.0])
+
+
+def test_a_live_game_whose_results_fail_goes_on():
+    with live_of(clickable(metrics=[NotYet()])) as live:
+        live.step(30)
+        assert live.step_number == 30
+        assert any("ZeroDivisionError" in note for note in live.notes)
 
 
 def test_two_runs_have_curves_of_their_own(runs):

@@ -16,7 +16,7 @@ from tussle.view.page.compare import Comparison
 from tussle.view.page.document import event_rows, game_document, scenery_blobs
 from tussle.view.page.drawing import drawing_message
 from tussle.view.page.packing import message, reals
-from tussle.view.page.recorded_curves import COLUMNS, column_changes, team_changes
+from tussle.view.page.recorded_curves import COLUMNS, column_changes, run_changes
 from tussle.view.recording import Recording
 
 FILE_STATES, FILE_FRAMES = 150_000, 32
@@ -131,8 +131,8 @@ class RecordedData:
         }
 
     def _curves(self) -> bytes:
-        """Entities left and born, and captures, of each team of each run over time."""
-        parts = (team_changes(run, team_shift) for run, team_shift, _ in self._runs)
+        """Entities left and born, captures, scores and results, of each run over time."""
+        parts = (run_changes(*run) for run in self._runs)
         return compact_json([each.document() for changes in parts for each in changes]).encode()
 
     @property

@@ -20,12 +20,13 @@ MOST_POINTS = 20_000
 """Frames of a recording from which a column is read; of more, every other one, every third, …"""
 
 
-def team_changes(run: Recording, team_shift: int = 0) -> list[Changes]:
-    """Return the entities left in each team, from the frames; those born and the captures made, from the events.
+def run_changes(run: Recording, team_shift: int = 0, id_shift: int = 0) -> list[Changes]:
+    """Return the entities left in each team, from the frames; those born and the captures made, from the events; recorded results.
 
     Args:
         run: The run.
         team_shift: What is added to the numbers of the teams.
+        id_shift: The id of the run's world.
     """
     team_of = {
         event.id: run.block_teams[run.blocks.index(event.text)]
@@ -42,13 +43,14 @@ def team_changes(run: Recording, team_shift: int = 0) -> list[Changes]:
     }
     if any(by_team.values()):
         changes += [_counted(CurveName("captures", team), float(run.t[0]), t) for team, t in by_team.items()]
-    return [_shifted(each, team_shift) for each in changes]
+    changes += [Changes(CurveName(name, team), 0, *found) for (name, team), found in run.results.items()]
+    return [_shifted(each, team_shift, id_shift) for each in changes]
 
 
-def _shifted(changes: Changes, team_shift: int) -> Changes:
+def _shifted(changes: Changes, team_shift: int, id_shift: int) -> Changes:
     q = changes.quantity
-    assert q.team is not None
-    return Changes(q._replace(team=q.team + team_shift), 0, changes.t, changes.values)
+    q = q._replace(id=id_shift) if q.team is None else q._replace(team=q.team + team_shift)
+    return Changes(q, 0, changes.t, changes.values)
 
 
 def _left(run: Recording) -> Iterable[Changes]:

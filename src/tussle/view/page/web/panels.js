@@ -29,7 +29,8 @@ export class Panels {
       first?.row.before(element('h3', 'run', `${name}: ${title}`));
     }
     /** What the card of scores shows. */
-    this.scored = layer instanceof Live ? 'score' : 'captures';
+    this.scored = layer instanceof Live || page.teams.some(({ id }) => layer.series.has('score', id)) ? 'score' : 'captures';
+    say(document.querySelector('#scores h2'), this.scored === 'score' ? 'Score' : 'Captures');
     this.fillInfo();
   }
 
@@ -52,7 +53,6 @@ export class Panels {
     const settings = differing.length ? ` · settings of A and B: ${differing.slice(0, MOST_DIFFERING).join(', ')}${more}` : '';
     byId('lead').hidden = !page.lead;
     say(byId('lead'), (page.lead || '') + settings);
-    say(document.querySelector('#scores h2'), this.status ? 'Score' : 'Captures');
     this.showNotes(page.notes);
     if (!page.isComplete) this.notice('This run was cut short: what there is of it is shown', true);
   }
@@ -137,12 +137,25 @@ export class Panels {
     });
     const scores = this.scores.map(({ team }) => series.of(scored, team.id));
     const range = scores.reduce((sum, each) => each.range(sum), [0, 1e-9]);
+    if (!(this.layer instanceof Live)) fillList(byId('metrics'), this.resultsAt(t));
     byId('scores').hidden = !scores.some(({ t: times }) => times.length) && !byId('metrics').children.length;
     this.scores.forEach(({ row, team, value, curve }, i) => {
       row.hidden = !scores[i].t.length;
       say(value, amount(scores[i].at(t)));
       this.drawCurve(curve, scores[i], range, t, team);
     });
+  }
+
+  /** Recorded results at a time, without scores. @param {number} t @returns {[string, string][]} */
+  resultsAt(t) {
+    const { layer: { results, series }, page } = this;
+    /** Names, teams and ids of the worlds and teams that have results. @type {[string, number | null, number][]} */
+    const owners = [...(page.runs || [{ name: '' }]).map(({ name }, i) => /** @type {[string, null, number]} */ ([name, null, i && page.idShift])),
+      ...page.teams.map(({ id, name }) => /** @type {[string, number, number]} */ ([name || `team ${id}`, id, 0]))];
+    return results.filter((name) => !name.endsWith('.score')).map((name) => [
+      name.replace('.', ' ').replaceAll('_', ' '),
+      owners.filter(([, team, id]) => series.has(name, team, id)).map(([owner, team, id]) => `${owner} ${amount(series.of(name, team, id).at(t))}`.trim()).join(', '),
+    ]);
   }
 
   /**

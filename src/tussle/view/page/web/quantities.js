@@ -4,13 +4,14 @@
 
 import { amount, byId, cleared, element, field, rgb, say, styled } from './formatting.js';
 import { Live } from './live.js';
-import { steps } from './series.js';
+import { OF_TEAMS, steps } from './series.js';
 
 /** Colours of entities in one plot, told apart with every kind of colour vision. */
 const COLOURS = ['#4aa3df', '#e8743b', '#2fb38a', '#d9ae1f', '#b59ad6', '#e05a9c'];
 /** Lines of one plot. */
 const MOST_LINES = 12;
-const OF_TEAMS = /** @type {const} */ ([['left', 'entities left'], ['born', 'entities born'], ['score', 'score'], ['captures', 'captures']]);
+/** Titles of quantities of teams. @type {Record<string, string>} */
+const TITLES = { left: 'entities left', born: 'entities born' };
 
 /** @typedef {{ label: string, colour: string, isDashed: boolean, team: number | null, id: number, row: HTMLElement, value: HTMLElement }} Line */
 /** @typedef {{ name: string, title: string, unit: string, lines: Line[], box: HTMLElement, canvas: HTMLCanvasElement, list: HTMLElement }} Plot */
@@ -61,9 +62,9 @@ export class QuantityPanel {
   /** Offer what there is. */
   offer() {
     const { layer, page, chosen } = this.player;
-    const teams = OF_TEAMS.filter(([name]) => page.teams.some(({ id }) => layer.series.has(name, id)));
+    const teams = OF_TEAMS.filter((name) => page.teams.some(({ id }) => layer.series.has(name, id)));
     /** @type {[string, string, string[][]][]} */
-    const groups = [['team', 'Teams', teams.map(([name, title]) => [name, title])], ['result', 'Results', layer.results.map((name) => [name, name])],
+    const groups = [['team', 'Teams', teams.map((name) => [name, TITLES[name] || name])], ['result', 'Results', layer.results.map((name) => [name, name])],
       ['column', 'Columns of the entities', this.columns().map(([name]) => [name, name])]];
     const key = JSON.stringify(groups);
     if (key !== this.offered) {
@@ -89,10 +90,12 @@ export class QuantityPanel {
     const ids = group === 'column' ? this.entities() : [];
     if (group === 'column' && !ids.length) return player.say('Click an entity, or write its number in the field');
     const unit = this.columns().find(([each]) => each === name)?.[1] || '';
-    const plot = this.plots.find((each) => each.name === name) || this.makePlot(name, OF_TEAMS.find(([each]) => each === name)?.[1] || name, unit);
+    const plot = this.plots.find((each) => each.name === name) || this.makePlot(name, TITLES[name] || name, unit);
     const teamsOfSecond = page.runs?.[1].teams || [];
     if (group !== 'column') {
-      if (layer.series.has(name) || !page.teams.some(({ id }) => layer.series.has(name, id))) this.addLine(plot, { label: name, colour: styled('--ink'), isDashed: false, team: null, id: 0 });
+      const ofWorld = { colour: styled('--ink'), team: /** @type {null} */ (null) };
+      if (!page.teams.some(({ id }) => layer.series.has(name, id))) this.addLine(plot, { ...ofWorld, label: page.runs ? 'A' : name, isDashed: false, id: 0 });
+      if (page.runs && layer.series.has(name, null, page.idShift)) this.addLine(plot, { ...ofWorld, label: 'B', isDashed: true, id: page.idShift });
       for (const { id, name: label, colour } of page.teams) {
         this.addLine(plot, { label: label || `team ${id}`, colour: rgb(colour), isDashed: teamsOfSecond.includes(id), team: id, id: 0 });
       }
@@ -140,12 +143,12 @@ export class QuantityPanel {
     const wanted = this.plots.flatMap(({ name, lines }) => [...new Set(lines.map(({ id }) => id))].map((id) => /** @type {[string, number]} */ ([name, id])));
     if (player.layer instanceof Live) {
       player.order('want', { wanted });
-      player.layer.series.keep((name, id) => OF_TEAMS.some(([each]) => each === name) || wanted.some(([each, who]) => each === name && who === id));
+      player.layer.series.keep((name, id) => OF_TEAMS.includes(name) || wanted.some(([each, who]) => each === name && who === id));
       return;
     }
     for (const [name, id] of wanted) {
       const blob = `column-${player.layer.number(id)}-${encodeURIComponent(name)}`;
-      if (!id || this.asked.has(blob)) continue;
+      if (!id || id === player.page.idShift || this.asked.has(blob)) continue;
       this.asked.add(blob);
       player.source.blob(blob).then((bytes) => {
         player.layer.series.take(JSON.parse(new TextDecoder().decode(bytes)));

@@ -1,11 +1,12 @@
 // A recorded run, whose chunks are unpacked when they are first needed.
-/** @import { EventRow, PageData, Sample, ShapesHeader, Source } from './types' */
+/** @import { Change, EventRow, PageData, Sample, ShapesHeader, Source } from './types' */
 
 import { between } from './geometry.js';
 import { Reader, readMessage } from './packing.js';
 import { Chunk } from './chunk.js';
 import { Layer } from './layer.js';
 import { lastNotAfter, lastWhere } from './ordered.js';
+import { OF_TEAMS } from './series.js';
 
 /** States that are kept unpacked, at some 45 bytes each; the chunks that were used last stay. */
 const MOST_STATES = 4e6;
@@ -37,7 +38,10 @@ export class Recorded extends Layer {
     /** @type {EventRow[]} */
     const rows = JSON.parse(new TextDecoder().decode(await this.source.blob('events')));
     this.setEvents(rows);
-    this.series.take(JSON.parse(new TextDecoder().decode(await this.source.blob('curves'))));
+    /** @type {Change[]} */
+    const changes = JSON.parse(new TextDecoder().decode(await this.source.blob('curves')));
+    this.series.take(changes);
+    this.results = [...new Set(changes.map(({ name }) => name))].filter((name) => !OF_TEAMS.includes(name));
   }
 
   get mostAtOnce() {

@@ -3,6 +3,9 @@
 
 import { lastNotAfter } from './ordered.js';
 
+/** Quantities of each team. */
+export const OF_TEAMS = ['left', 'born', 'score', 'captures'];
+
 /** A quantity: values that hold from times on; NaN where it is not known. */
 export class Series {
   constructor() {
