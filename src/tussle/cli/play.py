@@ -65,6 +65,7 @@ def record(
     period: float | None = None,
     shapes: bool = False,
     columns: str | None = None,
+    results: bool = False,
 ) -> Recorder:
     """Return a recorder of a simulation.
 
@@ -80,7 +81,7 @@ def record(
         remember(loaded.plugin_files)
     return Recorder(
         simulation, directory, period=period, mission_text=loaded.text, parameters=loaded.settings, shapes=shapes,
-        columns=columns or (), scene_files=loaded.scene_files, mission_notes=loaded.game_notes,
+        columns=columns or (), results=results, scene_files=loaded.scene_files, mission_notes=loaded.game_notes,
         plugin_files=loaded.plugin_files,
     )  # fmt: skip
 
@@ -224,7 +225,13 @@ def run(options: RunOptions) -> int:
                 )  # a wrong name is found before a directory is made
                 directory = options.directory or _new_directory(name, seed)
                 recorder = record(
-                    simulation, directory, loaded, options.log_period, options.shapes, options.record_columns
+                    simulation,
+                    directory,
+                    loaded,
+                    options.log_period,
+                    options.shapes,
+                    options.record_columns,
+                    options.results,
                 )
             if recorder is not None:
                 stack.push(partial(_close_interrupted, recorder))

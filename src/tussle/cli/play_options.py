@@ -52,6 +52,9 @@ class RunOptions(MissionOptions):
     ] = None
     shapes: Annotated[bool, flag("--shapes", "Record the shapes that plugins draw, too.")] = False
     record_columns: Annotated[str | None, columns_option()] = None
+    results: Annotated[
+        bool, flag("--results", "Record scores and results after each step, too, for curves in replays.")
+    ] = False
     pace: Annotated[
         float | None,
         option("X", "Play at most X times as fast as real time. The result does not change."),
@@ -62,10 +65,16 @@ class RunOptions(MissionOptions):
     ] = None
 
     def __post_init__(self) -> None:
-        given = self.directory, self.log_period, self.shapes or None, self.record_columns
-        if self.no_log and given != (None,) * 4:
+        recorded = (
+            self.directory,
+            self.log_period,
+            self.shapes or None,
+            self.record_columns,
+            self.results or None,
+        )
+        if self.no_log and recorded != (None,) * 5:
             raise typer.BadParameter(
-                "--no-log records nothing, so --out, --log-period, --shapes and --record-columns are not allowed with it"
+                "--no-log records nothing, so --out, --log-period, --shapes, --record-columns and --results are not allowed with it"
             )
         check_positive(pace=self.pace, log_period=self.log_period)
         is_changed = self.mission or self.more or self.settings or self.plugin_files

@@ -305,11 +305,15 @@ class Simulation:
         """
         restore(self.state, snapshot)
 
-    def result(self) -> list[WorldResult]:
-        """Result of each world; of running worlds, the result so far."""
+    def result(self, *, is_hashed: bool = True) -> list[WorldResult]:
+        """Result of each world; of running worlds, the result so far.
+
+        Args:
+            is_hashed: Also the state hash of running worlds, which takes longer than the rest.
+        """
         state = self.state
         return [
-            r if r is not None and not state.running[w] else world_result(state, w, "")
+            r if r is not None and not state.running[w] else world_result(state, w, "", is_hashed)
             for w, r in enumerate(state.results)
         ]
 

@@ -322,6 +322,24 @@ class Recording:
         if wrong:
             raise RecordError(f"{self.path / TRAJECTORY_FILE}: step {step}: {wrong}")
 
+    def team_column(self, i: int) -> np.ndarray:
+        """Team of each entity of a frame, (n,)."""
+        first, last = int(self._first[i]), int(self._last[i])
+        return self._column(first, last, "team") if last > first else np.zeros(0, np.int32)
+
+    def row_of(self, i: int, who: int) -> int:
+        """Row of an entity in the table at a frame; -1 if it is not there."""
+        first, last = int(self._first[i]), int(self._last[i])
+        if first == last:
+            return -1
+        ids = self._column(first, last, "id")
+        place = int(np.searchsorted(ids, who))
+        return first + place if place < len(ids) and ids[place] == who else -1
+
+    def value(self, row: int, name: str) -> float:
+        """A column of the table in a row."""
+        return float(self._column(row, row + 1, name)[0])
+
     def at(self, t: float) -> Frame:
         """The last frame that is not after a time [s]; the first for times before it.
 
@@ -376,6 +394,17 @@ class Recording:
         rows = [mine[name].to_pylist() for name in ("t", "kind", "id", "other", "text")]
         found = [Event(*row) for row in zip(*rows, strict=True)]
         return sorted(found, key=lambda event: event.t)
+
+    @cached_property
+    def results(self) -> dict[tuple[str, int | None], tuple[list[float], list[float]]]:
+        """Name and team of each score and result that was recorded -> times of its changes [s], and values."""
+        found: dict[tuple[str, int | None], tuple[list[float], list[float]]] = {}
+        table = self.run.results_table
+        for row in table.filter(pc.equal(table["world"], self.world)).to_pylist():
+            t, values = found.setdefault((row["name"], row["team"]), ([], []))
+            t.append(row["t"])
+            values.append(row["value"])
+        return found
 
     # -- shapes of plugins ------------------------------------------------------------------------------------------------------
 
