@@ -10,7 +10,6 @@ import numpy as np
 from tussle.numeric.quaternion import quat_conjugate, quat_from_euler, quat_multiply, quat_to_yaw
 from tussle.ros.node import checked_namespace
 from tussle.ros.steps import NodeLink, Transform
-from tussle.scene import Scene
 
 TWIST = "linear.x", "linear.y", "linear.z", "angular.x", "angular.y", "angular.z"
 ROOT = "world"
@@ -20,8 +19,8 @@ FRAMES = "odom", "base_footprint", "base_link", "base_laser_link"
 AT_ORIGIN = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]
 
 
-def height_above_floor(scene: Scene, pos: np.ndarray) -> np.ndarray:
-    """Height [m], (n,), of places, (3, n), above the highest surface of the scene there, or above z = 0 without one."""
+def height_above_floor(scene: Any, pos: np.ndarray) -> np.ndarray:
+    """Height [m], (n,), of places, (3, n), above the highest surface of a `Scene` there, or above z = 0 without one."""
     surface = scene.height(pos[0], pos[1])
     return np.asarray(pos[2] - np.where(surface > -np.inf, surface, 0.0))
 
@@ -128,8 +127,9 @@ class RobotTopics:
         self, stamp: Any, odometry: list[float], covariances: np.ndarray | None, truth: list[float]
     ) -> None:
         """Publish odometry and the true state, as those of `NodeLink.odometry`."""
-        for publish, *values in zip(self._publish, (odometry, truth), (covariances, None), strict=True):
-            publish(stamp, *values)
+        publish_odometry, publish_truth = self._publish
+        publish_odometry(stamp, odometry, covariances)
+        publish_truth(stamp, truth, None)
 
     def transforms(self, poses: list[list[float]], stamp: Any) -> list[Transform]:
         """Transforms of the robot's frames, 7 numbers each: of odom in the root, and so on, to the lidar where it has one."""
