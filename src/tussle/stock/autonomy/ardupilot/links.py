@@ -82,7 +82,7 @@ class UdpLink(AutopilotLink):
             return
         if self._peer is None:
             self._peer = place
-        elif place != self._peer:
+        elif place != self._peer and not self._has_replaced(frame, place):
             self.fail(
                 f"a second autopilot, at {_at(place)}, sends to the port of the one at {_at(self._peer)}"
             )
@@ -113,6 +113,10 @@ class UdpLink(AutopilotLink):
             self._is_unheard = True
         except OSError as error:
             self.fail(f"nothing can be sent: {error.strerror}")
+
+    def _has_replaced(self, frame: wire.ServoFrame, place: tuple[str, int]) -> bool:
+        """Whether a packet from another place is of an autopilot that has started anew, with which the vehicle goes on."""
+        return False
 
     @abstractmethod
     def _is_stranger(self, place: tuple[str, int]) -> bool:
@@ -207,7 +211,8 @@ class ScrimmageLink(UdpLink):
 class JsonLink(UdpLink):
     """The protocol "json": ArduPilot sends numbered frames to a port of tussle, and gets states from there.
 
-    The first frame tells where ArduPilot is. A frame with a higher number answers the state.
+    The first frame tells where ArduPilot is. A frame with a higher number answers the state. One with a lower number is of an
+    ArduPilot that has started anew, perhaps at another place: that is a failure, or with `may_restart` the next state is answered.
     """
 
     def __init__(
@@ -218,11 +223,13 @@ class JsonLink(UdpLink):
         timeout: float,
         resend_period: float,
         release: Callable[[], object],
+        may_restart: bool = False,
     ) -> None:
         received = bound(socket.SOCK_DGRAM, listen, port, "json_port")
         where = f"ArduPilot that sends to {listen}:{port}"
         super().__init__(where, received, lockstep, timeout, resend_period, release)
-        self._number = -1
+        self._number, self._may_restart = -1, may_restart
+        self._former: set[tuple[str, int] | None] = set()
 
     def begin(self, state: VehicleState, draws: Sequence[float] = ()) -> None:
         """Send the state, or wait for the first frame."""
@@ -233,6 +240,13 @@ class JsonLink(UdpLink):
         if self._peer:
             self._send()
 
+    def _has_replaced(self, frame: wire.ServoFrame, place: tuple[str, int]) -> bool:
+        if not self._may_restart or place in self._former or frame.number >= self._number:
+            return False
+        self._former.add(self._peer)
+        self._peer = place
+        return True
+
     def _is_stranger(self, place: tuple[str, int]) -> bool:
         return False
 
@@ -240,7 +254,10 @@ class JsonLink(UdpLink):
         return wire.decode_frame(data)
 
     def _take(self, frame: wire.ServoFrame) -> None:
-        if frame.number < self._number:
+        if frame.number < self._number and self._may_restart:
+            self._number = frame.number
+            self.commands, self.has_restarted, self.is_done = {}, True, True
+        elif frame.number < self._number:
             self.fail(f"it has started anew: its frame {frame.number} came after {self._number}")
         elif frame.number > self._number:
             self._number = frame.number
