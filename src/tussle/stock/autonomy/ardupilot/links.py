@@ -236,8 +236,9 @@ class JsonLink(UdpLink):
         self._n_packets = 0
         self.receive()  # before the state is there, so that it is not sent twice
         self._state = wire.encode_json(state)
-        self.is_done = self._peer is not None and not self.lockstep
-        if self._peer:
+        # One that has started anew gets the state only when its vehicle has been put back.
+        self.is_done = self.has_restarted or (self._peer is not None and not self.lockstep)
+        if self._peer and not self.has_restarted:
             self._send()
 
     def _has_replaced(self, frame: wire.ServoFrame, place: tuple[str, int]) -> bool:
