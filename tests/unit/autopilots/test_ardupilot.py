@@ -613,9 +613,21 @@ def test_two_autopilots_at_a_port_are_told_also_where_one_may_start_again():
             sim.run()
 
 
-def test_a_restart_that_cannot_be_noticed_is_refused():
-    with pytest.raises(ParameterError, match=r'on_restart = "reset" needs the protocol "json"'):
-        ArduPilot(on_restart="reset")
+def test_by_the_protocol_of_scrimmage_a_restart_is_a_packet_from_another_port():
+    port = free_ports(2)
+    mission = by_scrimmage(port, on_restart="reset", timeout=20.0, resend_period=0.1, end=LONG)
+    with Simulation(mission) as sim:
+        start = sim.read("copter.pos")[0][0, 0]
+        with servant_at("scrimmage", port):
+            sim.step(50)
+        assert abs(sim.read("copter.pos")[0][0, 0, 2] - start[2]) > 0.1
+        packet = struct.pack("<16H", *[1500] * 16)
+        with Noise(port, packets=(packet,)):
+            while not sim.read("copter.ArduPilot.restarts")[0].any():
+                sim.step()
+            assert np.abs(sim.read("copter.pos")[0][0, 0] - start).max() < 0.05
+            sim.step(20)
+        assert sim.read("copter.ArduPilot.restarts")[0].tolist() == [[1]]
 
 
 @pytest.mark.parametrize("protocol", ["json", "scrimmage"])

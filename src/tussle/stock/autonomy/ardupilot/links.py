@@ -30,6 +30,7 @@ class UdpLink(AutopilotLink):
         lockstep: Whether each state is answered.
         timeout: Longest wait for an answer [s].
         resend_period: Time after which a state that has no answer is sent again [s].
+        may_restart: Whether it goes on with an autopilot that has started anew.
         release: Called after the connection has been closed.
     """
 
@@ -40,9 +41,12 @@ class UdpLink(AutopilotLink):
         lockstep: bool,
         timeout: float,
         resend_period: float,
+        may_restart: bool,
         release: Callable[[], object],
     ) -> None:
         super().__init__(autopilot, lockstep, timeout, release)
+        self._may_restart = may_restart
+        self._former: set[tuple[str, int]] = set()
         self._in, self._resend_period = socket_, resend_period
         self._state, self._sent = b"", 0.0
         self._peer: tuple[str, int] | None = None
@@ -82,7 +86,12 @@ class UdpLink(AutopilotLink):
             return
         if self._peer is None:
             self._peer = place
-        elif place != self._peer and not self._has_replaced(frame, place):
+        elif place != self._peer and self._has_replaced(frame, place):
+            self._former.add(self._peer)
+            self._peer = place
+            self._restart(frame)
+            return
+        elif place != self._peer:
             self.fail(
                 f"a second autopilot, at {_at(place)}, sends to the port of the one at {_at(self._peer)}"
             )
@@ -116,7 +125,12 @@ class UdpLink(AutopilotLink):
 
     def _has_replaced(self, frame: wire.ServoFrame, place: tuple[str, int]) -> bool:
         """Whether a packet from another place is of an autopilot that has started anew, with which the vehicle goes on."""
-        return False
+        return self._may_restart and place not in self._former
+
+    def _restart(self, frame: wire.ServoFrame) -> None:
+        """Go on with an autopilot that has started anew: its vehicle has no commands until a state is answered."""
+        self.hear()
+        self.commands, self.has_restarted, self.is_done = {}, True, True
 
     @abstractmethod
     def _is_stranger(self, place: tuple[str, int]) -> bool:
@@ -150,11 +164,12 @@ class ScrimmageLink(UdpLink):
         lockstep: bool,
         timeout: float,
         resend_period: float,
+        may_restart: bool,
         release: Callable[[], object],
     ) -> None:
         received = bound(socket.SOCK_DGRAM, listen, from_port, "from_ardupilot_port")
         where = f"ArduPilot at {address}:{to_port}, servo packets at port {from_port}"
-        super().__init__(where, received, lockstep, timeout, resend_period, release)
+        super().__init__(where, received, lockstep, timeout, resend_period, may_restart, release)
         self._address = address
         self._out = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._out.setblocking(False)
@@ -171,9 +186,11 @@ class ScrimmageLink(UdpLink):
         """Send the state."""
         self._n_packets = 0
         self.receive()
-        self.is_done = not self.lockstep
+        # One that has started anew gets the state only when its vehicle has been put back.
+        self.is_done = self.has_restarted or not self.lockstep
         self._state = wire.encode_state(state)
-        self._send()
+        if not self.has_restarted:
+            self._send()
 
     def receive(self) -> None:
         """Read all packets, and whether nobody listens to the states."""
@@ -222,31 +239,29 @@ class JsonLink(UdpLink):
         lockstep: bool,
         timeout: float,
         resend_period: float,
+        may_restart: bool,
         release: Callable[[], object],
-        may_restart: bool = False,
     ) -> None:
         received = bound(socket.SOCK_DGRAM, listen, port, "json_port")
         where = f"ArduPilot that sends to {listen}:{port}"
-        super().__init__(where, received, lockstep, timeout, resend_period, release)
-        self._number, self._may_restart = -1, may_restart
-        self._former: set[tuple[str, int] | None] = set()
+        super().__init__(where, received, lockstep, timeout, resend_period, may_restart, release)
+        self._number = -1
 
     def begin(self, state: VehicleState, draws: Sequence[float] = ()) -> None:
         """Send the state, or wait for the first frame."""
         self._n_packets = 0
         self.receive()  # before the state is there, so that it is not sent twice
         self._state = wire.encode_json(state)
-        # One that has started anew gets the state only when its vehicle has been put back.
         self.is_done = self.has_restarted or (self._peer is not None and not self.lockstep)
         if self._peer and not self.has_restarted:
             self._send()
 
     def _has_replaced(self, frame: wire.ServoFrame, place: tuple[str, int]) -> bool:
-        if not self._may_restart or place in self._former or frame.number >= self._number:
-            return False
-        self._former.add(self._peer)
-        self._peer = place
-        return True
+        return super()._has_replaced(frame, place) and frame.number < self._number
+
+    def _restart(self, frame: wire.ServoFrame) -> None:
+        super()._restart(frame)
+        self._number = frame.number
 
     def _is_stranger(self, place: tuple[str, int]) -> bool:
         return False
@@ -256,8 +271,7 @@ class JsonLink(UdpLink):
 
     def _take(self, frame: wire.ServoFrame) -> None:
         if frame.number < self._number and self._may_restart:
-            self._number = frame.number
-            self.commands, self.has_restarted, self.is_done = {}, True, True
+            self._restart(frame)
         elif frame.number < self._number:
             self.fail(f"it has started anew: its frame {frame.number} came after {self._number}")
         elif frame.number > self._number:

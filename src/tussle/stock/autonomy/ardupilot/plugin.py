@@ -10,7 +10,6 @@ from tussle.api import GroupView, HistoricAttributes, Param, State
 from tussle.api.channel_map import ChannelMapParam
 from tussle.autopilots.link import MOST_PORT, resolved
 from tussle.autopilots.plugin import Autopilot
-from tussle.errors import ParameterError
 from tussle.stock.autonomy.ardupilot import wire
 from tussle.stock.autonomy.ardupilot.links import JsonLink, ScrimmageLink, UdpLink
 
@@ -30,7 +29,8 @@ class ArduPilot(Autopilot):
     gives 0. With the protocol "scrimmage" states go to to_ardupilot_port, and servo packets come to from_ardupilot_port; with
     ardupilot_port_base, servo packets come to that port + port_instance_multiplier times the id, and states go to the next port. With
     "json" ArduPilot sends to json_port + port_instance_multiplier times (id - 1), and is answered there. With `on_restart` "reset", an
-    ArduPilot that starts anew finds its vehicle as it was at birth; `restarts` counts. See [Autopilots](../autopilots.md).
+    ArduPilot that starts anew, as the numbers of its frames or its own port tell, finds its vehicle as it was at birth; `restarts`
+    counts. See [Autopilots](../autopilots.md).
 
     Differences from SCRIMMAGE: it waits for the answer to each state, where `asynchronous_mode` was the default, and sends states
     again; an autopilot that is silent ends the world; servo packets are taken from to_ardupilot_ip only, at 127.0.0.1 unless listen_ip
@@ -91,17 +91,10 @@ class ArduPilot(Autopilot):
         "end",
         choices=("end", "reset"),
         structural=True,
-        doc="What happens when ArduPilot starts anew: the world ends, or, with the protocol json, the vehicle is where it began.",
+        doc="What happens when ArduPilot starts anew: the world ends, or the vehicle is where it began.",
     )
     start_pose = State("x y z qw qx qy qz", unit="m m m 1 1 1 1", doc="Position and attitude at birth.")
     start_vel = State("x y z wx wy wz", unit="m/s m/s m/s rad/s rad/s rad/s", doc="Velocities at birth.")
-
-    def check_values(self) -> None:
-        """Check that a restart can be noticed."""
-        if self.values["on_restart"] == "reset" and self.values["protocol"] != "json":
-            raise ParameterError(
-                'ArduPilot.on_restart = "reset" needs the protocol "json": packets of the other have no numbers'
-            )
 
     def begin(self, g: GroupView, rows: np.ndarray) -> None:
         """Store the states of newborn vehicles."""
@@ -135,10 +128,11 @@ class ArduPilot(Autopilot):
         shift = own["world_step"] * row.world
         ports = [port + shift for port in ((json_port,) if is_json else (to_port, from_port))]
         release = self.claim(row, ports, OF_JSON if is_json else OF_SCRIMMAGE)
-        how = own["lockstep"], own["timeout"], own["resend_period"], release
+        may_restart = own["on_restart"] == "reset"
+        how = own["lockstep"], own["timeout"], own["resend_period"], may_restart, release
         try:
             if is_json:
-                return JsonLink(ports[0], listen, *how, may_restart=own["on_restart"] == "reset")
+                return JsonLink(ports[0], listen, *how)
             return ScrimmageLink(address, ports[0], ports[1], listen, *how)
         except BaseException:
             release()

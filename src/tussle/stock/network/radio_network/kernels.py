@@ -11,14 +11,13 @@ NEAREST = 1e-3
 """Distance below which the received power is constant [m]."""
 
 
-@kernel("I I I F (F F F B) F (Fw Fw Fw) (Fw Fw) (Fw Fw Bw)")
-def send(order, row, world, size, limits, offset, queue, on_air, span):
+@kernel("I (I I) F (F F F B) F (Fw Fw Fw) (Fw Fw) (Fw Fw Bw)")
+def send(order, place, size, limits, offset, queue, on_air, span):
     """Send the messages of each transmitter one after another; drop those that find a full queue.
 
     Args:
         order: Numbers of the messages in the order in which they are sent, (k,).
-        row: Row of the sender of each message, -1 for none, (k,).
-        world: World of each message, (k,).
+        place: Row of the sender of each message, -1 for none, and its world, (k,) each.
         size: Size of each message [byte], (k,).
         limits: Bandwidth [bit/s], queue limit [byte], beginning of the step [s], and whether all senders share a channel, (n_worlds,) each.
         offset: Time after the beginning of the step at which an idle transmitter starts [s], (n,).
@@ -27,6 +26,7 @@ def send(order, row, world, size, limits, offset, queue, on_air, span):
         on_air: First and last time at which a row sends in this step [s], (n,) each, updated.
         span: Start and end of each message on the air [s], and whether it was sent, (k,) each, written.
     """
+    row, world = place
     bandwidth, limit, begin, shares = limits
     ahead, busy_until, channel = queue
     first, last = on_air

@@ -150,5 +150,5 @@ class RadioNetwork(Network):
         order = np.argsort(links.sender, kind="stable") if self.shared_bandwidth.any() else np.arange(k)
         limits = self.bandwidth, self.queue_limit, begin, self.shared_bandwidth
         queue = ahead, self.busy_until, channel
-        kernels.send(order, links.sender, links.world, size, limits, offset, queue, on_air, span)
+        kernels.send(order, (links.sender, links.world), size, limits, offset, queue, on_air, span)
         return *span, on_air
