@@ -119,7 +119,7 @@ def test_a_community_is_told_where_all_are_in_its_units_and_frames(database):
     first = {key: values[0] for key in ("NAV_X", "NAV_Y", "NAV_HEADING", "NAV_SPEED", "NAV_DEPTH", "DEPLOY", "RETURN",
              "MOOS_MANUAL_OVERRIDE", "NODE_REPORT_LOCAL", "NODE_REPORT") if (values := database.read_values(key))}  # fmt: skip
     assert first.pop("NODE_REPORT") == (
-        "NAME=2,X=10.000,Y=20.000,SPD=0.000,HDG=270.000,DEP=3.000,TYPE=KAYAK,GROUP=2,MODE=none,TIME=0.000"
+        "NAME=2,X=10.000,Y=20.000,SPD=0.000,HDG=270.000,DEP=3.000,TYPE=KAYAK,GROUP=team_2,MODE=none,TIME=0.000"
     )
     assert first.pop("NODE_REPORT_LOCAL").startswith("NAME=1,X=0.000,Y=0.000,SPD=0.000,HDG=0.000,DEP=0.000,")
     assert first.pop("NAV_HEADING") == pytest.approx(0.0, abs=1e-9)

@@ -213,9 +213,9 @@ def _contacts(g: GroupView, world: int, time_: float) -> dict[int, bytes]:
 
 
 def _report(id_: int, team: int, state: list[float], time_: float) -> str:
-    """A node report of MOOS-IvP; state: the values of NAVIGATION."""
+    """A node report of MOOS-IvP; state: the values of NAVIGATION. GROUP is no number, since MOOS-IvP does not read numbers as groups."""
     x, y, heading, speed, depth = state
     return (
-        f"NAME={id_},X={x:.3f},Y={y:.3f},SPD={speed:.3f},HDG={heading:.3f},DEP={depth:.3f},TYPE=KAYAK,GROUP={team},"
+        f"NAME={id_},X={x:.3f},Y={y:.3f},SPD={speed:.3f},HDG={heading:.3f},DEP={depth:.3f},TYPE=KAYAK,GROUP=team_{team},"
         f"MODE=none,TIME={time_:.3f}"
     )
