@@ -154,14 +154,9 @@ def numbers_of(state: EntityState) -> dict[str, tuple[float, str]]:
         found |= _numbers(names if np.ndim(reading.value) else [column], reading)
     for plugin, columns in state.plugins.items():
         for column, reading in columns.items():
-            fields = [f"{plugin}.{name}" for name in field_names(column, reading.fields)]
+            fields = [f"{plugin}.{column}.{field}" for field in reading.fields]
             found |= _numbers(fields if np.ndim(reading.value) else [f"{plugin}.{column}"], reading)
     return found
-
-
-def field_names(column: str, fields: Iterable[str]) -> list[str]:
-    """Return the names of a column's fields: "goal.x", but "velocity_x" where the field has the column's name in it."""
-    return [field if field.startswith(column) else f"{column}.{field}" for field in fields]
 
 
 def _numbers(names: Iterable[str], reading: Reading) -> dict[str, tuple[float, str]]:

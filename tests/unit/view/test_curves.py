@@ -98,7 +98,7 @@ def test_columns_of_an_entity_are_its_state_in_each_step_from_when_they_are_chos
     wanted = [
         CurveName("x", None, 2),
         CurveName("speed", None, 2),
-        CurveName("GoWhereClicked.velocity_y", None, 2),
+        CurveName("GoWhereClicked.velocity.velocity_y", None, 2),
         CurveName("yaw", None, 3),
     ]
     with live_of(mission) as live:
@@ -160,8 +160,8 @@ def test_names_and_units_of_all_numbers_of_an_entity():
         "rad/s",
         "rad",
     ]
-    assert [units[n] for n in ("March.way", "March.goal.x", "March.velocity_x")] == ["m", "m", "m/s"]
-    assert numbers["March.velocity_x"][0] == -8.0
+    assert [units[n] for n in ("March.way", "March.goal.x", "March.velocity.velocity_x")] == ["m", "m", "m/s"]
+    assert numbers["March.velocity.velocity_x"][0] == -8.0
 
 
 class Odd(Metric):
