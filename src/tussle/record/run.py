@@ -17,6 +17,7 @@ from tussle.documents import DAMAGED, MOST_BYTES, read_text
 from tussle.errors import MissingExtraError, ParameterError, RecordError, listed, nearest_name
 from tussle.mission.limits import Limits
 from tussle.record.arrow_file import read_batches
+from tussle.record.plugin_columns import PluginColumn, plugin_columns
 from tussle.record.run_file import crc_of_file
 from tussle.record.schema import (
     EVENTS,
@@ -107,7 +108,8 @@ class Run:
     def _read_table(self, name: str, schema: pa.Schema, rules: Rules, is_mapped: bool) -> pa.Table:
         path, notes = self.path / name, list[str]()
         batches = read_batches(path, notes, RecordError, schema, rules, is_mapped=is_mapped, damage=notes)
-        table = pa.Table.from_batches(batches, schema)
+        complete = list(batches)
+        table = pa.Table.from_batches(complete, complete[0].schema if complete else schema)
         written = self.info.get("files", {}).get(name)
         if not notes and written is not None:
             found = {"bytes": path.stat().st_size, "rows": table.num_rows}
@@ -131,8 +133,13 @@ class Run:
 
     @cached_property
     def trajectory(self) -> Any:
-        """States: one row per entity and recorded step, as a frame."""
-        return self._frame(self.trajectory_table)
+        """States: one row per entity and recorded step, as a frame. Whole numbers and truths of plugins have types that can be missing."""
+        return frame_of(self.trajectory_table, self._frames, can_miss=True)
+
+    @cached_property
+    def columns(self) -> dict[str, PluginColumn]:
+        """Columns of plugins that were recorded with the states, by name."""
+        return plugin_columns(self.trajectory_table.schema)
 
     @cached_property
     def events(self) -> Any:
@@ -244,8 +251,14 @@ def check_frames(package: str) -> None:
         )
 
 
-def frame_of(table: pa.Table, package: str) -> Any:
+def frame_of(table: pa.Table, package: str, *, can_miss: bool = False) -> Any:
     """A table as a frame of a package that `check_frames` allows.
+
+    Args:
+        table: The table.
+        package: The package; "" is the first of them that is installed.
+        can_miss: Whether columns of 64-bit integers and of truths get pandas' types with missing values; otherwise such columns become
+            real numbers, or objects, if values are missing.
 
     Raises:
         MissingExtraError: The package is not installed.
@@ -256,7 +269,11 @@ def frame_of(table: pa.Table, package: str) -> Any:
             f"frames need {name or 'pandas or polars'}, which is not installed: pip install 'tussle[frames]' installs pandas; "
             "Arrow tables need neither"
         )
-    return table.to_pandas() if name == "pandas" else import_module(name).from_arrow(table)
+    if name != "pandas":
+        return import_module(name).from_arrow(table)
+    pandas = import_module(name)
+    types = {pa.int64(): pandas.Int64Dtype(), pa.bool_(): pandas.BooleanDtype()} if can_miss else {}
+    return table.to_pandas(types_mapper=types.get)
 
 
 def run_directory(path: str | Path) -> Path:

@@ -157,6 +157,7 @@ RUN = Document(
             "name": str,
             "dt": Real(5e-324),
             "start": Real(),
+            "end_conditions": Maybe([str]),
             "blocks": [{"name": str, "team": Whole(-(2**31), 2**31 - 1), "plugins": [str]}],
         },
         "worlds": [_WORLD],

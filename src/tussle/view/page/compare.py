@@ -10,6 +10,7 @@ import numpy as np
 
 from tussle.errors import ViewError
 from tussle.mission import Mission
+from tussle.record.plugin_columns import PluginColumn
 from tussle.view.drawn import Shape
 from tussle.view.frame import Event, Frame
 from tussle.view.page.settings import differing_settings
@@ -227,6 +228,20 @@ class Comparison:
             np.concatenate([a.pos, b.pos + self.shift]), np.concatenate([a.quat, b.quat]),
             np.concatenate([a.vel, b.vel]), np.concatenate([a.health, b.health]),
         )  # fmt: skip
+
+    @property
+    def columns(self) -> dict[str, PluginColumn]:
+        """Columns of plugins that were recorded of both runs, and those of one run whose names the other does not have."""
+        common = self.a.columns | self.b.columns
+        return {k: c for k, c in common.items() if self.a.columns.get(k, c) == self.b.columns.get(k, c)}
+
+    def values(self, i: int, name: str) -> np.ma.MaskedArray[Any, Any]:
+        """Return the values of a column of plugins at a time index, (n, k), in the order of the frame's ids; masked where there is none."""
+        parts = []
+        for run, pair in zip((self.a, self.b), self._pairs, strict=True):
+            n, k = int(run.counts[pair[i]]), len(self.columns[name].parts)
+            parts.append(run.values(int(pair[i]), name) if name in run.columns else np.ma.masked_all((n, k)))
+        return np.ma.concatenate(parts)
 
     @property
     def has_shapes(self) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import struct
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,7 @@ from tussle.view.page.chunks import ANGLE_ERROR, FULL_HEALTH, UNIT, pack, positi
 from tussle.view.page.compare import Comparison
 from tussle.view.page.document import event_rows, game_document, scenery_blobs
 from tussle.view.page.drawing import drawing_message
-from tussle.view.page.packing import message, reals
+from tussle.view.page.packing import ints, message, reals
 from tussle.view.page.recorded_curves import COLUMNS, column_changes, run_changes
 from tussle.view.recording import Recording
 
@@ -127,6 +128,16 @@ class RecordedData:
             "angleError": ANGLE_ERROR,
             "chunks": self.chunks,
             "shapeFrames": SHAPE_FRAMES if game.has_shapes else 0,
+            "columns": [
+                {
+                    "name": column.name,
+                    "kind": column.dtype.__name__,
+                    "fields": list(column.fields),
+                    "units": list(column.units),
+                    "doc": column.doc,
+                }
+                for column in game.columns.values()
+            ],
             **more,
         }
 
@@ -145,8 +156,13 @@ class RecordedData:
             "curves",
             *self._scenery,
             *chunks,
+            *(f"columns-{i}" for i in range(self._n_column_blobs)),
             *(f"shapes-{i}" for i in range(self._n_shape_blobs)),
         ]
+
+    @property
+    def _n_column_blobs(self) -> int:
+        return len(self.chunks) if self._game.columns else 0
 
     @property
     def _n_shape_blobs(self) -> int:
@@ -165,14 +181,33 @@ class RecordedData:
         kind, _, number = name.partition("-")
         if kind == "column" and not self._is_file:
             return self._column(*number.partition("-")[::2])
-        n_blobs = {"chunk": len(self.chunks), "shapes": self._n_shape_blobs}.get(kind, 0)
+        n_blobs = {
+            "chunk": len(self.chunks),
+            "columns": self._n_column_blobs,
+            "shapes": self._n_shape_blobs,
+        }.get(kind, 0)
         if not number.isdecimal() or len(number) > 9 or int(number) >= n_blobs:
             return None
         if kind == "shapes":
             return self._shapes(int(number) * SHAPE_FRAMES)
         first, last = self.chunks[int(number)]
-        frames = [self._game.frame(int(i)) for i in self.kept[first : last + 1]]
-        return pack(first, frames, self.step, self._leap)
+        kept = self.kept[first : last + 1].tolist()
+        if kind == "columns":
+            return self._columns(kept)
+        return pack(first, [self._game.frame(i) for i in kept], self.step, self._leap)
+
+    def _columns(self, numbers: Sequence[int]) -> bytes:
+        """Columns of plugins in some frames.
+
+        `ints` of the entities of each frame, and of all ids, frame after frame; then for each component of each column the `reals` of these
+        entities, NaN where one does not have the column.
+        """
+        ids = [self._game.frame(i).id for i in numbers]
+        parts = [ints(np.array([len(each) for each in ids])), ints(np.concatenate(ids))]
+        for name in self._game.columns:
+            values = np.ma.concatenate([self._game.values(i, name) for i in numbers])
+            parts += [reals(component) for component in values.astype(float).filled(np.nan).T]
+        return b"".join(parts)
 
     @property
     def _runs(self) -> list[tuple[Recording, int, int]]:

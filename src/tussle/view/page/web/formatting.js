@@ -78,10 +78,15 @@ export function say(node, text = '') {
   if (node.textContent !== text) node.textContent = text;
 }
 
-/** Fill a list with names and values. @param {Element} list @param {[string, string][]} rows */
+/** Fill a list with names and values; a third text says what a name is. @param {Element} list @param {[string, string, string?][]} rows */
 export function fillList(list, rows) {
   if (list.children.length !== 2 * rows.length) list.replaceChildren(...rows.flatMap(() => [element('dt'), element('dd')]));
-  rows.flat().forEach((text, i) => say(list.children[i], text));
+  rows.forEach(([name, text, about = ''], i) => {
+    const [title, value] = [list.children[2 * i], list.children[2 * i + 1]];
+    say(title, name);
+    say(value, text);
+    if (title.getAttribute('title') !== about) title.setAttribute('title', about);
+  });
 }
 
 /** A value of the page's style. @param {string} name */

@@ -1,5 +1,5 @@
 // A live game: its newest frame, and those before, for the trails.
-/** @import { Change, EventRow, PageData, Sample, Status } from './types' */
+/** @import { Change, EventRow, PageData, Sample, Section, Status } from './types' */
 
 import { Chunk, Moment } from './chunk.js';
 import { Layer } from './layer.js';
@@ -72,6 +72,12 @@ export class Live extends Layer {
       this.setEvents(this.rows);
     }
     this.changed();
+  }
+
+  /** Columns of an entity's plugins, and its messages. @param {number} id @returns {Section[]} */
+  sectionsOf(id) {
+    const entity = this.status?.entity;
+    return entity?.id === id ? entity.sections.slice(1) : [];
   }
 
   show() {

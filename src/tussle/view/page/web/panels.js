@@ -201,11 +201,10 @@ export class Panels {
     }
   }
 
-  /** Show columns of plugins and messages of a live game's entity. @param {number} id */
+  /** Show columns of plugins, and messages of a live game's entity. @param {number} id */
   showSections(id) {
     const box = byId('sections');
-    const entity = this.status?.entity;
-    const sections = entity?.id === id ? entity.sections.slice(1) : [];
+    const sections = this.layer.sectionsOf(id);
     const titles = sections.map(([title]) => title).join('\n');
     if (titles !== this.titles) box.replaceChildren(...sections.map(([title]) => element('section', '', '', element('h3', '', title), element('dl'))));
     this.titles = titles;
