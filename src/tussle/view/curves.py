@@ -53,7 +53,7 @@ class GameCurves:
 
     def forget_after(self, step: int) -> None:
         """Forget all steps after one."""
-        self.series = {quantity: series.until(step) for quantity, series in self.series.items()}
+        self.series = {name: each.until(step) for name, each in self.series.items() if each.first <= step}
         self._last, self._who = min(self._last, step), None
 
     def rest(self, seconds: float) -> None:
@@ -97,6 +97,9 @@ class GameCurves:
         if series is None or step < series.first:
             series = StepSeries()
         elif step <= series.last:
+            return
+        elif series.values[-1] == value and not self._is_after_gap:  # mostly, and then at little cost
+            series.last = step
             return
         self.series[quantity] = series = series.add(step, value, is_after_gap=self._is_after_gap)
         if series.is_thinned:

@@ -70,6 +70,8 @@ def test_quantities_of_the_world_are_its_results_in_each_step(mission):
 def test_another_course_of_the_game_has_its_own_curves():
     with live_of(guarded_gate()) as live:
         live.step(120)
+        live.watch([CurveName("x", None, 1)])
+        live.step(5)
         live.seek(4.0)
         live.publish(CustomKeyPress, key=";")
         assert max(each.last for each in live.curves.series.values()) == 40
