@@ -6,6 +6,7 @@ import json
 import math
 import struct
 from collections.abc import Sequence
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,7 @@ from tussle.view.page.compare import Comparison
 from tussle.view.page.document import event_rows, game_document, scenery_blobs
 from tussle.view.page.drawing import drawing_message
 from tussle.view.page.packing import ints, message, reals
-from tussle.view.page.recorded_curves import COLUMNS, column_changes, run_changes
+from tussle.view.page.recorded_curves import column_changes, quantities_of, run_changes
 from tussle.view.recording import Recording
 
 FILE_STATES, FILE_FRAMES = 150_000, 32
@@ -115,7 +116,7 @@ class RecordedData:
             **game_document(game, self._mission, self._viewer, self._title),
             "source": "embedded" if self._is_file else "range",
             "facts": facts,
-            "quantities": [] if self._is_file else list(COLUMNS.items()),
+            "quantities": [] if self._is_file else list(self._quantities.items()),
             "idShift": game.id_shift,
             "isComplete": game.is_complete,
             "nFrames": len(self.kept),
@@ -217,11 +218,17 @@ class RecordedData:
             return [(game.a, 0, 0), (game.b, game.team_shift, game.id_shift)]
         return [(game, 0, 0)]
 
+    @cached_property
+    def _quantities(self) -> dict[str, str]:
+        """Columns of the entities of any of the runs, and their units."""
+        return {name: unit for run, _, _ in self._runs for name, unit in quantities_of(run).items()}
+
     def _column(self, who: str, column: str) -> bytes | None:
         """Changes of a column of an entity, in each run that has it."""
-        if not who.isdecimal() or len(who) > 9 or column not in COLUMNS:
+        if not who.isdecimal() or len(who) > 9 or column not in self._quantities:
             return None
-        changes = [column_changes(run, int(who), column, id_shift) for run, _, id_shift in self._runs]
+        runs = [run for run in self._runs if column in quantities_of(run[0])]
+        changes = [column_changes(run, int(who), column, id_shift) for run, _, id_shift in runs]
         return compact_json([each.document() for each in changes if each.t]).encode()
 
     def _shapes(self, first: int) -> bytes:
