@@ -138,8 +138,10 @@ def analyse(
     Raises:
         ParameterError: There is no such quantity or point.
     """
-    notes, info = list(results.notes), results.info
     chosen = list(dict.fromkeys(quantities)) or results.usual
+    for name in quantities:
+        results.quantity(name)  # columns that only recorded runs have add a note
+    notes, info = list(results.notes), results.info
     looked_at = list(dict.fromkeys(quantities)) or leading(results)
     has_points = len(results.points) > 1
     return Analysis(

@@ -27,13 +27,14 @@ from tussle.batch.statistics import (
     paired_difference,
     share_of,
 )
+from tussle.batch.store import RUNS
 from tussle.batch.survival import N_TIMES, Survival, survival_of
 from tussle.batch.variables import Choice, Range, Variable
 from tussle.batch.varied import variable_of
 from tussle.displays import counted, line, listing, page, table
 from tussle.errors import ParameterError, listed
 from tussle.mission.codecs import written as text_of
-from tussle.record.run import check_frames, frame_of
+from tussle.record.run import check_frames, frame_of, load_run
 
 if TYPE_CHECKING:
     from tussle.batch.store import StoredBatch
@@ -181,13 +182,19 @@ class Results:
         """A number of each run, (n,); NaN where it failed.
 
         Args:
-            expression: A name such as "score[2]", or arithmetic with names.
+            expression: A name such as "score[2]", or arithmetic with names. A recorded column of plugins, such as "Boids.goal.x[1]", is its
+                mean over the states of a team, and NaN for runs that are not recorded.
             runs: Numbers of the runs; None for all that are finished, in order.
 
         Raises:
             ParameterError: There is no such name, or a run is not finished.
         """
-        values = Quantity.parse(expression).evaluate(self._columns)
+        parsed, columns = Quantity.parse(expression), self._columns
+        try:
+            parsed.names(columns)
+        except ParameterError:
+            columns = columns | self._recorded
+        values = parsed.evaluate(columns)
         if runs is None:
             return values
         wanted = np.asarray(list(runs), dtype=np.int64)
@@ -196,6 +203,31 @@ class Results:
         if not is_there.all():
             raise ParameterError(f"run {wanted[~is_there][0]} is not among the {self.n_runs} finished runs")
         return values[place]
+
+    @cached_property
+    def _recorded(self) -> dict[str, np.ndarray]:
+        """Mean of each recorded column of plugins over the states of a team, (n,); NaN for runs that are not recorded."""
+        found: dict[str, np.ndarray] = {}
+        n_recorded, folder = 0, self.path or Path()
+        for row, number in enumerate(self._run.tolist() if self.path else ()):
+            place = folder / RUNS / f"{number:06d}"
+            run = load_run(place, is_mapped=True) if place.exists() else None
+            if run is None or not run.is_complete or not run.columns:
+                continue
+            n_recorded += 1
+            parts = [part for column in run.columns.values() for part in column.parts]
+            by_team = run.trajectory_table.group_by("team", use_threads=False)
+            means = by_team.aggregate([(part, "mean") for part in parts]).to_pylist()
+            for each in means:
+                for part in parts:
+                    if each[f"{part}_mean"] is not None:
+                        name = column_name(part, each["team"])
+                        found.setdefault(name, np.full(self.n_runs, np.nan))[row] = each[f"{part}_mean"]
+        if found:
+            self.notes.append(
+                f"columns of plugins are known of {counted(n_recorded, 'run')}, with which they were recorded"
+            )
+        return found
 
     def shares(self, point: int | None = None) -> list[Share]:
         """Games that each team won, and ties, with Wilson's interval; nothing for games without scores.
