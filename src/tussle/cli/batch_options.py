@@ -69,7 +69,23 @@ class BatchOptions(ManyGamesOptions):
         str | None,
         option(
             "WIDTH",
-            "Stop when half of a 95 % interval is this narrow: 0.02 (share of wins of each team), 'score[2]:0.5'.",
+            "Stop when half of a 95 % interval is this narrow: 0.02 (share of wins of each team), 'score[2]:0.5'. Or play only "
+            "the points whose interval is not yet: 'width(Guard.share) < 0.02'.",
+        ),
+    ] = None
+    target: Annotated[
+        str | None,
+        option(
+            "EXPR",
+            "Find the smallest value at which a mean reaches a target, and play only what that needs: 'Guard.share >= 0.95'. Up to "
+            "1,000 games of each point, or --runs.",
+        ),
+    ] = None
+    over: Annotated[
+        str | None,
+        option(
+            "NAME",
+            "The variable whose smallest value is searched; by default the first range, or choice of numbers.",
         ),
     ] = None
     directory: Annotated[
@@ -114,6 +130,14 @@ class OptimizeOptions(ManyGamesOptions):
             "Quantity whose mean over the games is maximized: 'score[3]-score[2]', 'wins[2]', 't'.",
         ),
     ] = ""
+    subject_to: Annotated[
+        list[str],
+        option(
+            "EXPR",
+            "Constraint that the mean over the games is to keep: 'lost[1] / start[1] < 0.2'. Can be repeated.",
+            "--subject-to",
+        ),
+    ] = field(default_factory=list)
     minimize: Annotated[bool, flag("--minimize", "Minimize the quantity instead.")] = False
     trials: Annotated[int, option("N", "Sets of values to try.", min=1, shows_default=True)] = 100
     runs: Annotated[
@@ -167,6 +191,21 @@ class AnalyzeOptions:
             "A B", "Compare, paired by seed, points with these numbers or values: tactic=keep tactic=switch."
         ),
     ] = None
+    target: Annotated[
+        str | None,
+        option(
+            "EXPR",
+            "Show from which value on a mean reaches a target, for each choice, and which further runs would narrow it: "
+            "'Guard.share >= 0.95'; by default the target of the command that played the batch.",
+        ),
+    ] = None
+    over: Annotated[
+        str | None,
+        option(
+            "NAME",
+            "The variable whose smallest value is searched; by default the first range, or choice of numbers.",
+        ),
+    ] = None
     by_point: Annotated[bool, flag("--by-point", "Show all points, not only twenty.")] = False
     as_json: Annotated[bool, flag("--json", "Print everything as JSON.")] = False
 
@@ -187,3 +226,17 @@ class ReportOptions:
             "--quantity",
         ),
     ] = field(default_factory=list)
+    target: Annotated[
+        str | None,
+        option(
+            "EXPR",
+            "Open with the answer to this question, as of tussle analyze; by default that of the command that played the batch.",
+        ),
+    ] = None
+    over: Annotated[
+        str | None,
+        option(
+            "NAME",
+            "The variable whose smallest value is searched; by default the first range, or choice of numbers.",
+        ),
+    ] = None

@@ -169,7 +169,13 @@ class _Exporter:
 
         recording = self.recording
         with ProgressMeter("rosbag2", "states") as meter:
-            report = write_rosbag2(recording, files["rosbag2"], period=self._options.period, show=meter.show)
+            report = write_rosbag2(
+                recording,
+                files["rosbag2"],
+                period=self._options.period,
+                storage=self._options.storage or "mcap",
+                show=meter.show,
+            )
         for note in report.notes:
             say_note(note)
         _report(report.path, f"{report.n_frames:,} states, {report.n_messages:,} messages")

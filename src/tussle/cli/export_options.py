@@ -32,6 +32,7 @@ USED_BY = {
     "at": ("png",),
     "scale": (*IMAGES, "mcap"),
     "period": ("html", "mcap", "rosbag2"),
+    "storage": ("rosbag2",),
 }  # fmt: skip
 """Outputs that use an option."""
 SPECIAL_NAMES = {"start": "--from", "stop": "--to"}
@@ -97,6 +98,10 @@ class ExportOptions(PluginOptions):
         float | None,
         option("S", "Time between the states in --html, --mcap and --rosbag2 [s]; by default all states."),
     ] = None
+
+    storage: Annotated[str | None, option("mcap|sqlite3", "File format of --rosbag2; by default mcap.")] = (
+        None
+    )
 
     def __post_init__(self) -> None:
         if not self.files:

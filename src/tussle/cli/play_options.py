@@ -34,10 +34,14 @@ class RunOptions(MissionOptions):
         ),
     ] = ""
     from_batch: Annotated[
-        str | None, option("BATCH:RUN", "Play a run of a batch again instead of a mission.", "--from")
+        str | None,
+        option(
+            "BATCH:RUN", "Play a run of a batch, or a run directory, again instead of a mission.", "--from"
+        ),
     ] = None
     trust: Annotated[
-        bool, flag("--trust", "With --from: run the plugin code of a batch directory made by someone else.")
+        bool,
+        flag("--trust", "With --from: run the plugin code of a batch or run directory made by someone else."),
     ] = False
     directory: Annotated[
         Path | None, option("DIR", "Run directory; by default runs/NAME-SEED-TIMESTAMP.", "--out")
@@ -48,6 +52,9 @@ class RunOptions(MissionOptions):
     ] = None
     shapes: Annotated[bool, flag("--shapes", "Record the shapes that plugins draw, too.")] = False
     record_columns: Annotated[str | None, columns_option()] = None
+    results: Annotated[
+        bool, flag("--results", "Record scores and results after each step, too, for curves in replays.")
+    ] = False
     pace: Annotated[
         float | None,
         option("X", "Play at most X times as fast as real time. The result does not change."),
@@ -58,10 +65,16 @@ class RunOptions(MissionOptions):
     ] = None
 
     def __post_init__(self) -> None:
-        given = self.directory, self.log_period, self.shapes or None, self.record_columns
-        if self.no_log and given != (None,) * 4:
+        recorded = (
+            self.directory,
+            self.log_period,
+            self.shapes or None,
+            self.record_columns,
+            self.results or None,
+        )
+        if self.no_log and recorded != (None,) * 5:
             raise typer.BadParameter(
-                "--no-log records nothing, so --out, --log-period, --shapes and --record-columns are not allowed with it"
+                "--no-log records nothing, so --out, --log-period, --shapes, --record-columns and --results are not allowed with it"
             )
         check_positive(pace=self.pace, log_period=self.log_period)
         is_changed = self.mission or self.more or self.settings or self.plugin_files

@@ -42,7 +42,14 @@ def view(options: ViewOptions) -> int:
         if options.record is not None:
             # Closed last, however the game ends.
             recorder = stack.enter_context(
-                record(simulation, options.record, loaded, shapes=True, columns=options.record_columns)
+                record(
+                    simulation,
+                    options.record,
+                    loaded,
+                    shapes=True,
+                    columns=options.record_columns,
+                    results=True,
+                )
             )
         live = Live(
             simulation,

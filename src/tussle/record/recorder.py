@@ -14,10 +14,12 @@ import numpy as np
 import pyarrow as pa
 
 from tussle.errors import MissionError, ParameterError, RecordError
-from tussle.mission import to_xml
+from tussle.mission import PluginFile, to_xml
 from tussle.record import run_file
 from tussle.record.events import BIRTH, END, Events
 from tussle.record.plugin_columns import ColumnReader, select
+from tussle.record.plugin_copies import plugin_copies
+from tussle.record.results import ResultRows
 from tussle.record.row_buffer import RowBuffer, RowSelection
 from tussle.record.schema import (
     EVENTS,
@@ -26,6 +28,8 @@ from tussle.record.schema import (
     LINKS,
     LINKS_FILE,
     MISSION_FILE,
+    RESULTS,
+    RESULTS_FILE,
     SHAPES,
     SHAPES_FILE,
     TRAJECTORY_FILE,
@@ -34,6 +38,8 @@ from tussle.record.shapes import ShapeRows
 from tussle.record.stream import Stream
 from tussle.record.traffic import Traffic, check_file_names
 
+MOST_RESULTS = 100_000
+"""Changes of results that are collected between two flushes."""
 MOST_LETTERS = 4_000_000
 """Characters of shapes that are collected between two flushes."""
 
@@ -50,7 +56,7 @@ class Recorded(Protocol):
     @property
     def grade(self) -> str: ...
 
-    def result(self) -> list[Any]: ...
+    def result(self, *, is_hashed: bool = True) -> list[Any]: ...
 
 
 class Recorder:
@@ -72,8 +78,10 @@ class Recorder:
         columns: `State` and `Output` columns of plugins that are recorded with the states: "prey.Boids.goal", or "Boids.goal" for all
             blocks; `*` stands for any characters, and a text may name several, separated by commas. Columns that are declared with
             `recorded=True` are always recorded.
+        results: Whether scores and results of metrics, interactions and networks are recorded after each step, whatever the period.
         scene_files: Files of terrain, meshes and textures that the mission's text names, which are copied, by name: see
             `tussle.mission.Loaded`.
+        plugin_files: Python files with the mission's plugins, which are copied: see `tussle.mission.Loaded`.
 
     Raises:
         RecordError: The directory holds a run, or cannot be written.
@@ -93,7 +101,9 @@ class Recorder:
         flush_every: float = 1.0,
         shapes: bool = False,
         columns: str | Iterable[str] = (),
+        results: bool = False,
         scene_files: Mapping[str, Path] | None = None,
+        plugin_files: Sequence[PluginFile] = (),
     ) -> None:
         for name, value in (("period", period), ("flush_every", flush_every)):
             if value is not None and not 0.0 < value < float("inf"):
@@ -120,11 +130,18 @@ class Recorder:
         self._common_step = -1
         self._steps = np.full(sim.n_worlds, -1, np.int64)
         self._others: list[str] = []
-        self._open(mission_text, shapes, scene_files or {})
+        self._open(mission_text, shapes, results, scene_files or {}, plugin_files)
         self._flush_at = time.monotonic() + flush_every
         self._begin()
 
-    def _open(self, mission_text: str | None, shapes: bool, scene_files: Mapping[str, Path]) -> None:
+    def _open(
+        self,
+        mission_text: str | None,
+        shapes: bool,
+        results: bool,
+        scene_files: Mapping[str, Path],
+        plugin_files: Sequence[PluginFile],
+    ) -> None:
         try:
             self.directory.mkdir(parents=True, exist_ok=True)
             held = [name for name in FILES if (self.directory / name).exists()]
@@ -142,6 +159,10 @@ class Recorder:
                     place.parent.mkdir(parents=True, exist_ok=True)
                     shutil.copyfile(file, place)
                     self._others.append(name)
+            for name, text in plugin_copies(plugin_files).items():
+                (self.directory / name).parent.mkdir(parents=True, exist_ok=True)
+                (self.directory / name).write_text(text, encoding="utf-8")
+                self._others.append(name)
         except OSError as error:
             raise RecordError(
                 f"{self.directory}: cannot record a run there: {error.strerror or error}"
@@ -156,6 +177,10 @@ class Recorder:
                 Stream(self.directory / SHAPES_FILE, SHAPES),
             )
             self._streams.append(self._shape_stream)
+        self._results = ResultRows(self.sim) if results else None
+        if results:
+            self._result_stream = Stream(self.directory / RESULTS_FILE, RESULTS)
+            self._streams.append(self._result_stream)
         self._traffic = Traffic(self.sim.mission.networks, self.directory, self.sim.n_worlds)
 
     def _written_back(self) -> str:
@@ -185,6 +210,8 @@ class Recorder:
 
     def _observe(self, sim: Recorded) -> None:
         """Record the states at the beginning of a step, if it is due."""
+        if self._results:
+            self._results.read()
         clock = sim.state.context.clock
         step = clock.common
         if step < 0:
@@ -203,7 +230,9 @@ class Recorder:
                 if bodies.ints is not self._rows_source:
                     self._rows_source, self._rows = bodies.ints, RowSelection(bodies.ints)
                 self._add(self._rows, step)
-        if time.monotonic() >= self._flush_at or (self._shapes and self._shapes.n_letters > MOST_LETTERS):
+        n_letters = self._shapes.n_letters if self._shapes else 0
+        n_results = self._results.n if self._results else 0
+        if time.monotonic() >= self._flush_at or n_letters > MOST_LETTERS or n_results > MOST_RESULTS:
             self.flush()
 
     def _observe_apart(self, sim: Recorded) -> None:
@@ -262,6 +291,8 @@ class Recorder:
             self._write(self._trajectory, self._buffer.take())
         if self._shapes and (drawn := self._shapes.take()):
             self._write(self._shape_stream, drawn)
+        if self._results and (changes := self._results.take()):
+            self._write(self._result_stream, changes)
         self._flush_at = time.monotonic() + self.flush_every
 
     def _take_events(self) -> pa.RecordBatch:
@@ -296,6 +327,8 @@ class Recorder:
         self.is_closed = True
         self._detach()
         sim, step = self.sim, self.sim.state.context.clock.step
+        if self._results:
+            self._results.read()
         last = np.maximum(self._steps, self._common_step)
         unrecorded = sim.state.running & (step > last)
         if unrecorded.any():

@@ -28,6 +28,9 @@ from tussle.record.schema import (
     LINKS_FILE,
     LINKS_RULES,
     MISSION_FILE,
+    RESULTS,
+    RESULTS_FILE,
+    RESULTS_RULES,
     RUN,
     RUN_FILE,
     SHAPES,
@@ -75,6 +78,7 @@ class Run:
         self.trajectory_table = self._read_table(TRAJECTORY_FILE, TRAJECTORY, TRAJECTORY_RULES, is_mapped)
         self.events_table = self._read_table(EVENTS_FILE, EVENTS, EVENTS_RULES, False)
         self.shapes_table = self._read_if_written(SHAPES_FILE, SHAPES, SHAPES_RULES, is_mapped)
+        self.results_table = self._read_if_written(RESULTS_FILE, RESULTS, RESULTS_RULES, False)
         self.links_table = self._read_if_written(LINKS_FILE, LINKS, LINKS_RULES, False)
 
     def _read_if_written(self, name: str, schema: pa.Schema, rules: Rules, is_mapped: bool) -> pa.Table:
@@ -141,6 +145,11 @@ class Run:
     def events(self) -> Any:
         """Births, deaths, captures, collisions and ends, as a frame."""
         return self._frame(self.events_table)
+
+    @cached_property
+    def results(self) -> Any:
+        """Scores and results, one row for each change, as a frame; empty unless they were recorded."""
+        return self._frame(self.results_table)
 
     @cached_property
     def links(self) -> Any:

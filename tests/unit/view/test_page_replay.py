@@ -70,7 +70,10 @@ def test_a_served_run_is_what_was_recorded(runs, monkeypatch, is_mapped):
                 off = np.array([seen[who].pos for who in frame.id.tolist()]) - frame.pos
                 assert np.linalg.norm(off, axis=1).max() <= document["positionError"] + 1e-11
         assert len(json.loads(blob("events"))) == len(recording.events)
-        assert sum(n[0] for n in document["curves"]["n"]) == len(recording.frame(0))
+        curves = {
+            (c["name"], c["team"]): dict(zip(c["t"], c["v"], strict=True)) for c in json.loads(blob("curves"))
+        }
+        assert curves["left", 1][0.0] + curves["left", 2][0.0] == len(recording.frame(0))
         with pytest.raises(HTTPError, match="404"):
             blob("chunk-999")
 

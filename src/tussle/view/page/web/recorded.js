@@ -1,11 +1,13 @@
 // A recorded run, whose chunks are unpacked when they are first needed.
-/** @import { EventRow, PageData, Sample, Section, ShapesHeader, Source } from './types' */
+/** @import { Change, EventRow, PageData, Sample, Section, ShapesHeader, Source } from './types' */
 
 import { between } from './geometry.js';
 import { Reader, readMessage } from './packing.js';
 import { Chunk } from './chunk.js';
 import { ColumnChunk } from './columns.js';
-import { lastNotAfter, lastWhere, Layer } from './layer.js';
+import { Layer } from './layer.js';
+import { lastNotAfter, lastWhere } from './ordered.js';
+import { OF_TEAMS } from './series.js';
 
 /** States that are kept unpacked, at some 45 bytes each; the chunks that were used last stay. */
 const MOST_STATES = 4e6;
@@ -26,7 +28,6 @@ export class Recorded extends Layer {
     this.shapes = new Map();
     /** Columns of plugins by chunk. @type {Map<number, ColumnChunk>} */
     this.columns = new Map();
-    this.curves = page.curves;
     this.times = new Float64Array(0);
     this.slack = 0;
   }
@@ -40,6 +41,10 @@ export class Recorded extends Layer {
     /** @type {EventRow[]} */
     const rows = JSON.parse(new TextDecoder().decode(await this.source.blob('events')));
     this.setEvents(rows);
+    /** @type {Change[]} */
+    const changes = JSON.parse(new TextDecoder().decode(await this.source.blob('curves')));
+    this.series.take(changes);
+    this.results = [...new Set(changes.map(({ name }) => name))].filter((name) => !OF_TEAMS.includes(name));
   }
 
   get mostAtOnce() {
