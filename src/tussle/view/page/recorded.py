@@ -206,8 +206,8 @@ class RecordedData:
         ids = [self._game.frame(i).id for i in numbers]
         parts = [ints(np.array([len(each) for each in ids])), ints(np.concatenate(ids))]
         for name in self._game.columns:
-            values = np.ma.concatenate([self._game.values(i, name) for i in numbers])
-            parts += [reals(component) for component in values.astype(float).filled(np.nan).T]
+            values: np.ma.MaskedArray[Any, Any] = np.ma.vstack([self._game.values(i, name) for i in numbers])
+            parts += [reals(component) for component in np.ma.filled(values.astype(float), np.nan).T]
         return b"".join(parts)
 
     @property
