@@ -36,6 +36,7 @@ from tussle.batch.statistics import (
     share_of,
 )
 from tussle.batch.survival import N_TIMES, Survival, survival_of
+from tussle.batch.target import Answers, Layout, Target, answers_of, crossing_of
 from tussle.batch.variables import Choice, Range, Variable
 from tussle.batch.varied import variable_of
 from tussle.displays import counted, line, listing, page, table
@@ -152,7 +153,9 @@ class Results:
 
     @property
     def n_planned(self) -> int:
-        """Runs that were to be played."""
+        """Runs that were to be played; where points have different numbers of seeds, those that are finished."""
+        if self.info["is_complete"] and self.info.get("is_partial"):
+            return self.n_runs
         return int(self.info["n_runs"])
 
     @property
@@ -379,6 +382,32 @@ class Results:
         games = np.full((int(self._seed_index.max(initial=-1)) + 1, len(self.points)), -1)
         games[self._seed_index, self._point] = self._game
         return games
+
+    def answers(self, target: str | Target | None = None, over: str | None = None) -> Answers | None:
+        """The smallest value of a variable at which the mean of a quantity reaches a target, for each choice.
+
+        Args:
+            target: Such as "Guard.share >= 0.95"; None for that of the command that played the batch, if it had one.
+            over: Name of the variable; None for that of the command, else for the first range, else the first choice of numbers.
+
+        Raises:
+            ParameterError: There is no such quantity or variable, or the target is written otherwise.
+        """
+        if target is None and (target := self.info.get("target")) is None:
+            return None
+        asked = Target.parse(target) if isinstance(target, str) else target
+        layout = Layout.of(self.variables, self.points, over or self.info.get("over"))
+        expression = str(asked.quantity)
+        found = answers_of(asked, self.title(expression), layout, self.points, self.by_seed(expression))
+        if found.over is None:
+            return found
+        try:
+            fit = self.response(expression)
+        except ParameterError:  # too few points for a curve
+            return found
+        name = found.over.name
+        placed = (replace(a, crossing=crossing_of(fit, asked, name, a.values)) for a in found.answers)
+        return replace(found, answers=tuple(placed))
 
     def select(self, text: str) -> list[int]:
         """The points at which variables have the values that a text such as "tactic=keep, prey_speed=20" names.

@@ -17,7 +17,7 @@ from tussle.batch.selection import written
 from tussle.batch.sensitivity import Effect
 from tussle.batch.statistics import PairedComparison, Share
 from tussle.batch.variables import Range, Variable
-from tussle.cli.batch import short_names
+from tussle.cli.batch import answer_tables, short_names
 from tussle.cli.batch_options import AnalyzeOptions, ReportOptions
 from tussle.cli.progress import home_short
 from tussle.cli.tables import Cell, Row, indented, number_tables, title
@@ -33,7 +33,9 @@ def report(options: ReportOptions) -> None:
     from tussle.batch.report import write_report
 
     directory = options.directory or options.batch / "report"
-    written_report = write_report(load_batch(options.batch), directory, options.quantities)
+    written_report = write_report(
+        load_batch(options.batch), directory, options.quantities, options.target, options.over
+    )
     for note in written_report.notes:
         say_note(note)
     n = len(written_report.plots)
@@ -51,11 +53,15 @@ def analyze(options: AnalyzeOptions) -> None:
         ParameterError: There is no such quantity or point.
     """
     compare = [options.compare] if options.compare else []
-    found = analyse(load_batch(options.directory), options.quantities, compare)
+    results = load_batch(options.directory)
+    found = analyse(results, options.quantities, compare)
     if options.as_json:
-        typer.echo(json.dumps(found.as_dict(), indent=1, allow_nan=False))
+        answers = results.answers(options.target, options.over)
+        target = {} if answers is None else {"target": answers.as_dict()}
+        typer.echo(json.dumps(found.as_dict() | target, indent=1, allow_nan=False))
         return
-    put("", *_parts(found, options.by_point), "")
+    heading, *parts = _parts(found, options.by_point)
+    put("", heading, *answer_tables(results, options.target, options.over), *parts, "")
     for note in found.notes:
         say_note(note)
 

@@ -8,7 +8,6 @@ import sys
 import numpy as np
 import pytest
 from made_batches import made_batch
-from scipy.stats import spearmanr
 
 from tussle.batch.results import Results
 from tussle.batch.sampling import sample
@@ -164,6 +163,8 @@ def test_points_are_a_factorial_in_any_order_or_none():
 
 
 def test_the_rank_correlation_is_that_of_the_points_means():
+    from scipy.stats import spearmanr
+
     points = sample(ISHIGAMI, "lhs", 40, seed=7)
     scores = ishigami(points) + np.random.default_rng(8).normal(size=(5, 40))
     found = results_of(scores, variables=ISHIGAMI, points=points, sample="lhs").sensitivity("score[2]")

@@ -36,13 +36,21 @@ class Report:
     notes: tuple[str, ...]
 
 
-def write_report(results: Results, directory: str | Path, quantities: Sequence[str] = ()) -> Report:
+def write_report(
+    results: Results,
+    directory: str | Path,
+    quantities: Sequence[str] = (),
+    target: str | None = None,
+    over: str | None = None,
+) -> Report:
     """Write the page `index.html` and its plots; the same batch gives the same bytes.
 
     Args:
         results: What is reported.
         directory: Where to; made if need be.
         quantities: Expressions that get plots of their own beside wins and scores, such as "score[2]-score[3]".
+        target: The page opens with the answer to this question, see `Results.answers`; None for that of the command line.
+        over: Name of the variable whose smallest value is searched.
 
     Raises:
         ParameterError: There is no such quantity.
@@ -57,14 +65,16 @@ def write_report(results: Results, directory: str | Path, quantities: Sequence[s
         data = ReportData(results, quantities)
         sections = sections_of(data)
         pictures = {p.name: pictured(p.draw(), f"plot-{p.name}", p.title) for s in sections for p in s.plots}
-        asked = answers(data)
+        short = answers(data)
     from tussle.batch.report.sections import answer, notes
 
+    found = results.answers(target, over)
+    asked = [] if found is None else [f"{sentence}." for sentence in found.sentences()]
     page = write_page(
         Path(directory) / INDEX, sections, pictures,
         title=str(results.info.get("name") or "A batch of games"), version=str(results.info.get("tussle", "")),
         source="a batch in memory" if results.path is None else f"the batch {results.path.resolve().name}",
-        answer=answer(data), answers=asked, notes=notes(data),
+        answer=" ".join([*asked, answer(data)]), answers=short, notes=notes(data),
     )  # fmt: skip
     missing = "".join(sorted({letter for picture in pictures.values() for letter in picture.missing}))
     note = f"the font of the PNG files has no {missing}; the page and the SVG files show it"

@@ -54,7 +54,14 @@ def sheet(height: float) -> Figure:
     return Figure(figsize=(WIDTH, height), layout="compressed")  # maps keep close to their scales and legends
 
 
-def add_head(figure: Figure, tracks: Trajectories, what: str, handles: Sequence[Handle] = ()) -> None:
+def add_head(
+    figure: Figure,
+    tracks: Trajectories,
+    what: str,
+    handles: Sequence[Handle] = (),
+    *,
+    has_seed: bool = True,
+) -> None:
     """Write title and legend over the axes; the figure grows by their lines."""
     names = [shortened(name, 30) for _, name in handles]
     widths = [6 + len(name) for name in names]
@@ -62,17 +69,17 @@ def add_head(figure: Figure, tracks: Trajectories, what: str, handles: Sequence[
     figure.set_figheight(figure.get_figheight() + 0.2 + 0.17 * -(-len(names) // n_columns))
     legend = figure.legend(
         [handle for handle, _ in handles], names, loc="outside upper left", ncols=n_columns, borderaxespad=0.2,
-        title=f"{what} · {_game(tracks, LETTERS - 3 - len(what))}", alignment="left", columnspacing=1.4,
+        title=f"{what} · {_game(tracks, LETTERS - 3 - len(what), has_seed)}", alignment="left", columnspacing=1.4,
     )  # fmt: skip
     legend.get_title().set_color(MUTED)
     legend.get_title().set_fontsize(8)
 
 
-def _game(tracks: Trajectories, n_letters: int) -> str:
-    """Name, world and seed of the game, in so many letters."""
+def _game(tracks: Trajectories, n_letters: int, has_seed: bool) -> str:
+    """Name, world and, unless it is of several runs, seed of the game, in so many letters."""
     recording = tracks.recording
     worlds = recording.run.info.get("worlds", ())
-    seed = f", seed {worlds[recording.world]['seed']}" if recording.world < len(worlds) else ""
+    seed = f", seed {worlds[recording.world]['seed']}" if has_seed and recording.world < len(worlds) else ""
     about = f", world {recording.world}{seed}" if len(worlds) > 1 else seed
     return shortened(recording.name, max(8, n_letters - len(about))) + about
 
