@@ -35,7 +35,7 @@ def further_runs(answers: Answers, info: Mapping[str, Any], path: Path | None) -
     if answers.over is not None and (info.get("over") or len(answers.notes)):
         asked += ["--over", answers.over.name]
     found = []
-    if wanted := answers.wanted:
+    if wanted := answers.wanted():
         n = RUNS if info["n_seeds"] < RUNS else 2 * int(info["n_seeds"])
         words = [
             *without(command[2:], COUNTS),
