@@ -56,6 +56,9 @@ def test_what_a_page_tells_one_to_type_works(tmp_path, environment, page):
             printed = done.stdout
             n_commands += len(lines)
         elif language == "text":
-            assert comparable(printed) == comparable(body)
+            shown, found = comparable(body), comparable(printed)
+            if shown[-1].strip() == "...":  # the page leaves out what follows
+                shown, found = shown[:-1], found[: len(shown) - 1]
+            assert found == shown
     assert n_commands >= PAGES[page]
     shutil.rmtree(folder)

@@ -52,7 +52,7 @@ def default_quantities(
     scores = [name for team in teams if (name := column_name("score", team)) in known]
     measured = _measured(known)
     left = [_left(known, team) for team in teams if _has_lost(known, team)]
-    tells = _Telling(known, varied)
+    tells = Telling(known, varied)
     leading: list[str] = []
     for names in ([*tells(scores), *tells(measured)[:MAX_MEASURED]], tells(left), tells(["t"])):
         leading = leading or tells(names)
@@ -101,8 +101,8 @@ def _left(known: Mapping[str, np.ndarray], team: int) -> str:
     return column_name("lost" if varies(known[column_name("start", team)]) else "alive", team)
 
 
-class _Telling:
-    """Chooses the quantities that vary and repeat nothing.
+class Telling:
+    """Chooses the quantities that vary and repeat neither a varied value nor one before them.
 
     Args:
         known: Name -> value for each run, (n,).
@@ -118,6 +118,7 @@ class _Telling:
         ]
 
     def __call__(self, names: Sequence[str]) -> list[str]:
+        """Return those of them that tell something, in order."""
         found: list[str] = []
         for name in names:
             values = self.known.get(name)

@@ -15,11 +15,11 @@ import numpy as np
 
 from tussle.batch.statistics import SEED, scipy_package
 
-MOST_TUNED = 150
+MOST_TUNED = 80
 """So many points, evenly spaced by number, choose lengths and noise."""
 JITTER = 1e-8
 N_DRAWS = 200
-MOST_DRAWN = 300
+MOST_DRAWN = 200
 """So many points, evenly spaced by number, stand for all in a draw of the posterior."""
 
 Part = tuple[float, float, float]
@@ -86,19 +86,32 @@ class Covariance:
     is_number: tuple[bool, ...]
     noise: float
 
-    def factor(self, i: int, a: np.ndarray, b: np.ndarray) -> np.ndarray:
-        """Correlation along one axis, (len(a), len(b))."""
+    def factor(self, i: int, apart: np.ndarray) -> np.ndarray:
+        """Correlation along one axis of places that are so far apart."""
         if not self.is_number[i]:
-            return np.where(a[:, None] == b[None, :], 1.0, self.shape[i])
-        r = math.sqrt(5.0) * np.abs(a[:, None] - b[None, :]) / self.shape[i]
-        return np.asarray((1.0 + r + r**2 / 3.0) * np.exp(-r))
+            return np.where(apart == 0.0, 1.0, self.shape[i])
+        r = apart * (math.sqrt(5.0) / self.shape[i])
+        return np.asarray((1.0 + r + r * r / 3.0) * np.exp(-r))
+
+    def of(self, apart: np.ndarray) -> np.ndarray:
+        """Covariance of the fit at pairs of rows, (n, m).
+
+        Args:
+            apart: Their distances along each axis, (n_axes, n, m).
+        """
+        found = np.full(apart.shape[1:], self.amplitude)
+        for i, along in enumerate(apart):
+            found *= self.factor(i, along)
+        return found + CONSTANT
 
     def __call__(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
         """Covariance of the fit at rows of coordinates, (len(a), len(b))."""
-        found = np.full((len(a), len(b)), self.amplitude)
-        for i in range(a.shape[1]):
-            found *= self.factor(i, a[:, i], b[:, i])
-        return found + CONSTANT
+        return self.of(distances(a, b))
+
+
+def distances(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Distances of rows of coordinates along each axis, (n_axes, len(a), len(b))."""
+    return np.asarray(np.abs(a.T[:, :, None] - b.T[:, None, :]))
 
 
 class Posterior:
@@ -107,10 +120,12 @@ class Posterior:
     Newton's method as in Rasmussen and Williams, algorithm 3.1.
     """
 
-    def __init__(self, kernel: Covariance, x: np.ndarray, observed: Observed) -> None:
+    def __init__(
+        self, kernel: Covariance, x: np.ndarray, observed: Observed, apart: np.ndarray | None = None
+    ) -> None:
         linalg = scipy_package().linalg
         self.kernel, self.x = kernel, x
-        whole = kernel(x, x)
+        whole = kernel.of(distances(x, x) if apart is None else apart)
         whole[np.diag_indices(len(x))] += kernel.noise + JITTER
         f, a = np.zeros(len(x)), np.zeros(len(x))
         if observed.is_share:  # a good place to begin
@@ -166,20 +181,16 @@ def tuned_kernel(is_number: Sequence[bool], x: np.ndarray, observed: Observed) -
     some = thinned(np.arange(len(x)), MOST_TUNED)
     x, observed = x[some], replace(observed, mean=observed.mean[some], weight=observed.weight[some])
 
+    apart = distances(x, x)
+
     def loss(theta: np.ndarray) -> float:
-        return -Posterior(_kernel_of(is_number, theta), x, observed).evidence + 0.5 * float(
-            (((theta - middle) / sd) ** 2).sum()
-        )
+        evidence = Posterior(_kernel_of(is_number, theta), x, observed, apart).evidence
+        return -evidence + 0.5 * float((((theta - middle) / sd) ** 2).sum())
 
     bounds = [(m - 4.0 * s, m + 4.0 * s) for m, s in zip(centre, spread, strict=True)]
-    starts = [middle, middle - np.array([0.0, 0.0, *(float(is_length) for is_length in is_number)])]
-    found = [
-        scipy_package().optimize.minimize(
-            loss, start, method="L-BFGS-B", bounds=bounds, options={"maxiter": 40, "ftol": 1e-7}
-        )
-        for start in starts
-    ]
-    return _kernel_of(is_number, min(found, key=lambda result: float(result.fun)).x)
+    options = {"maxiter": 30, "ftol": 1e-6}
+    found = scipy_package().optimize.minimize(loss, middle, method="L-BFGS-B", bounds=bounds, options=options)
+    return _kernel_of(is_number, found.x)
 
 
 def variance_parts(
@@ -206,7 +217,7 @@ def variance_parts(
     square, product = [], []  # of each axis: means of k(x, .) k(x, .)', and products of the means of k(x, .)
     for i in range(x.shape[1]):
         at, n = np.unique(own[:, i], return_counts=True)
-        factor = kernel.factor(i, at, own[:, i])
+        factor = kernel.factor(i, np.abs(at[:, None] - own[None, :, i]))
         share = n / n.sum()
         square.append(factor.T @ (share[:, None] * factor))
         middle = share @ factor

@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from statistics import NormalDist
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -20,15 +20,12 @@ from tussle.batch.statistics import LEVEL, scipy_package
 from tussle.batch.variables import Choice, Range, Variable
 from tussle.errors import ParameterError, listed, nearest_name
 
-if TYPE_CHECKING:
-    from tussle.batch.results import Results
-
 FEWEST_POINTS = 4
 FEWEST_LEVELS = 3
 """A choice of numbers is a number if it has at least so many, else a choice like any other."""
 WIDE_RATIO = 50.0
 """Numbers whose largest ratio is at least this are fitted by their logarithm."""
-MOST_POINTS = 600
+MOST_POINTS = 400
 """Of more points so many are fitted, evenly spaced by number: the fit takes the third power of it."""
 PRIOR_DEGREES = 4.0
 """Degrees of freedom with which the spread over all points counts into that of a point with few runs."""
@@ -69,6 +66,21 @@ class FittedVariable:
     is_number: bool
     is_log: bool
 
+    def spread(self, n: int) -> list[Any]:
+        """Values, at most n of them, evenly from the lowest to the highest; whole ones of a range of whole numbers."""
+        if not self.is_number:
+            return list(self.values)
+        space = np.geomspace if self.is_log else np.linspace
+        found = space(float(self.values[0]), float(self.values[-1]), n)
+        if self.is_whole:
+            found = np.unique(np.round(found))
+        return [int(value) if self.is_whole else float(value) for value in found]
+
+    @property
+    def is_whole(self) -> bool:
+        """All values are whole numbers."""
+        return self.is_number and all(float(value).is_integer() for value in self.values)
+
     def coordinates(self, values: Sequence[Any]) -> np.ndarray:
         """Places from 0 to 1 of numbers, numbers of choices, (n,).
 
@@ -101,7 +113,8 @@ def axes_of(variables: Sequence[Variable], points: Sequence[Mapping[str, Any]]) 
         if is_number:
             values.sort()
         elif isinstance(variable, Choice):
-            values.sort(key=variable.values.index)
+            order = list(variable.values)
+            values.sort(key=lambda v: order.index(v) if v in order else len(order))
         is_log = is_number and values[0] > 0.0
         if isinstance(variable, Range):
             is_log &= variable.is_log
@@ -157,18 +170,6 @@ def point_means(matrix: np.ndarray, *, has_own_seeds: bool = False) -> PointMean
     own = own / (np.maximum(n - 1, 0) + PRIOR_DEGREES)
     variance = np.maximum(own - common, 0.05 * own) / np.maximum(n, 1)
     return PointMeans(mean, variance, common / max(float(n[n > 0].mean()), 1.0))
-
-
-def fit_response(results: Results, expression: str) -> Response:
-    """Fit a quantity over all variables.
-
-    Raises:
-        ParameterError: There is no such quantity, nothing varies, or too few points have runs.
-    """
-    return fitted(
-        results.variables, results.points, results.by_seed(expression),
-        is_share=results.is_share(expression), has_own_seeds=bool(results.info["independent"]), what=expression,
-    )  # fmt: skip
 
 
 def fitted(
@@ -309,14 +310,20 @@ class Response:
         return (found, max(low, -1.0), min(high, 1.0)) if self.is_share else (found, low, high)
 
     def plane(
-        self, across: str, up: str, xs: Sequence[Any], ys: Sequence[Any], n_around: int = 12
+        self,
+        across: str,
+        up: str,
+        xs: Sequence[Any],
+        ys: Sequence[Any],
+        given: Mapping[str, Any] | None = None,
     ) -> np.ndarray:
-        """The fit over two variables, the others as at the points, (len(ys), len(xs)).
+        """The fit over two variables, the others given or as at the points, (len(ys), len(xs)).
 
         Raises:
             ParameterError: A variable does not vary, or a choice was never played.
         """
-        rows = np.stack([self._around({across: x, up: y}, n_around) for y in ys for x in xs])
+        held = given or {}
+        rows = np.stack([self._around({**held, across: x, up: y}, N_AROUND // 4) for y in ys for x in xs])
         shape = rows.shape
         mean = self._mode.mean(rows.reshape(-1, shape[-1])).reshape(shape[:2])
         return np.asarray(self._outward(mean)[0].mean(axis=1).reshape(len(ys), len(xs)))

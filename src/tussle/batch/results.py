@@ -15,9 +15,15 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from tussle.batch import run_table
-from tussle.batch.default_quantities import COUNTED, DefaultQuantities, default_quantities, is_within_one
+from tussle.batch.default_quantities import (
+    COUNTED,
+    DefaultQuantities,
+    Telling,
+    default_quantities,
+    is_within_one,
+)
 from tussle.batch.quantities import Quantity, column_name, metric_of
-from tussle.batch.response import fit_response
+from tussle.batch.response import Response, fitted
 from tussle.batch.selection import is_number, known_point, paired_points, select_points, written
 from tussle.batch.sensitivity import Effect, effects, rank_effects
 from tussle.batch.statistics import (
@@ -82,6 +88,7 @@ class Results:
                 f"{n_copies:,} of {self.n_runs:,} runs are copies of another run of their point: they end in the same state; "
                 f"intervals count distinct games ({self.n_distinct:,})"
             )
+        self._fits: dict[tuple[str, bool], Response] = {}
         self._columns = self._quantities_of(facts)
         names = [v.name for v in self.variables]
         keyed = run_table.with_values(facts, self.design, names, self._columns)
@@ -280,8 +287,20 @@ class Results:
     @cached_property
     def defaults(self) -> DefaultQuantities:
         """The quantities that are shown if none are asked for."""
-        varied = [[self.points[i][v.name] for i in self._point.tolist()] for v in self.variables]
-        return default_quantities(self._columns, list(self.teams), varied)
+        return default_quantities(self._columns, list(self.teams), self._varied)
+
+    def telling(self, expressions: Sequence[str]) -> list[str]:
+        """Those of some quantities that vary and repeat neither a varied value nor one before them.
+
+        Raises:
+            ParameterError: There is no such quantity.
+        """
+        return Telling({text: self.quantity(text) for text in expressions}, self._varied)(expressions)
+
+    @property
+    def _varied(self) -> list[list[Any]]:
+        """Values of each variable, run by run."""
+        return [[self.points[i][v.name] for i in self._point.tolist()] for v in self.variables]
 
     def canonical(self, expression: str) -> str:
         """One text for each quantity: "score[2]" for " score[2]", "Cap.hits[1]" for "Cap.hits" where only team 1 has it.
@@ -383,12 +402,12 @@ class Results:
         if found.over is None:
             return found
         try:
-            fit = fit_response(self, expression)
+            fit = self.response(expression)
         except ParameterError:  # too few points for a curve
             return found
         name = found.over.name
-        fitted = (replace(a, crossing=crossing_of(fit, asked, name, a.values)) for a in found.answers)
-        return replace(found, answers=tuple(fitted))
+        with_fit = (replace(a, crossing=crossing_of(fit, asked, name, a.values)) for a in found.answers)
+        return replace(found, answers=tuple(with_fit))
 
     def select(self, text: str) -> list[int]:
         """The points at which variables have the values that a text such as "tactic=keep, prey_speed=20" names.
@@ -405,7 +424,30 @@ class Results:
             ParameterError: There is no such quantity.
             MissingExtraError: The points were sampled for indices that take a package which is not there.
         """
-        return effects(self.variables, self.points, self.by_seed(expression), self._step)
+        return effects(
+            self.variables,
+            self.points,
+            self.by_seed(expression),
+            self._step,
+            lambda: self._fit(expression, is_share=False),
+        )
+
+    def response(self, expression: str) -> Response:
+        """A smooth fit of a quantity over all that varies, with its band.
+
+        Raises:
+            ParameterError: There is no such quantity, nothing varies, or too few points have runs.
+        """
+        return self._fit(expression, is_share=self.is_share(expression))
+
+    def _fit(self, expression: str, *, is_share: bool) -> Response:
+        key = (expression, is_share)
+        if key not in self._fits:
+            self._fits[key] = fitted(
+                self.variables, self.points, self.by_seed(expression),
+                is_share=is_share, has_own_seeds=bool(self.info["independent"]), what=expression,
+            )  # fmt: skip
+        return self._fits[key]
 
     def rank_correlations(self, expression: str) -> list[Effect]:
         """Same as `sensitivity` without parts of the variance; it needs no optional package."""

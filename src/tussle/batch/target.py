@@ -170,7 +170,7 @@ def _first(x: np.ndarray, y: np.ndarray, target: Target) -> float:
 
 
 @dataclass(frozen=True)
-class Answer:
+class ChoiceAnswer:
     """The answer for one choice, that is one value of each variable that is no number.
 
     Attributes:
@@ -249,7 +249,7 @@ class Answers:
     target: Target
     title: str
     over: Variable | None
-    answers: tuple[Answer, ...]
+    answers: tuple[ChoiceAnswer, ...]
     notes: list[str] = field(default_factory=list)
 
     @property
@@ -266,10 +266,10 @@ class Answers:
         """One sentence for each choice."""
         return [self._sentence(answer) + self._fitted(answer) for answer in self.answers]
 
-    def _fitted(self, answer: Answer) -> str:
+    def _fitted(self, answer: ChoiceAnswer) -> str:
         return "" if answer.crossing is None else f"; by a smooth fit it takes {answer.crossing.text}"
 
-    def _sentence(self, answer: Answer) -> str:
+    def _sentence(self, answer: ChoiceAnswer) -> str:
         whose = f"{answer.label}: " if answer.label else ""
         smallest, first = answer.smallest, answer.at_least
         if self.over is None:
@@ -472,5 +472,5 @@ def answers_of(
             of_choice.append(
                 Level(min(x), max(x), numbers, len(observed), mean, low, high, target.state(low, high))
             )
-        found.append(Answer(values, tuple(of_choice)))
+        found.append(ChoiceAnswer(values, tuple(of_choice)))
     return Answers(target, title, layout.over, tuple(found), list(layout.notes))

@@ -411,10 +411,13 @@ def answer_tables(
 
 
 def point_tables(results: Results) -> list[Padding]:
-    """Return one line per point: its values, and who won how often there, or the leading quantities where nobody wins."""
-    winners = [share for share in results.shares() if share.n]
+    """Return one line per point: its values, who won how often there, and the leading quantities, without scores where somebody wins."""
+    shares = results.shares()
+    has_winner = any(share.n for share in shares if share.team is not None)
+    winners = [share for share in shares if share.n and has_winner]
     teams = [share.team for share in winners]
-    means = {} if winners else {name: results.means_by_point(name) for name in results.defaults.leading}
+    names = [n for n in results.defaults.leading if not (winners and n.startswith("score["))]
+    means = {name: results.means_by_point(name) for name in names}
     head = ["point", *short_names(results.variables), *(f"{share.name} won, %" for share in winners)]
     head += map(results.title, means)
     rows = [

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from made_batches import made_batch
 
-from tussle.batch.response import FEWEST_POINTS, fit_response, fitted, point_means
+from tussle.batch.response import FEWEST_POINTS, fitted, point_means
 from tussle.batch.results import Results
 from tussle.batch.sampling import sample
 from tussle.batch.variables import Choice, Range
@@ -109,9 +109,9 @@ def test_parts_of_the_variance_are_those_of_the_function():
 def test_values_of_batches_are_fitted():
     points = sample([UAV, TACTIC], "product", 8, 1)
     share = played(points, 5, 1)
-    fit = fit_response(
-        Results(made_batch({}, variables=[UAV, TACTIC], points=points, metrics={"G.s": {None: share}})), "G.s"
-    )
+    fit = Results(
+        made_batch({}, variables=[UAV, TACTIC], points=points, metrics={"G.s": {None: share}})
+    ).response("G.s")
     assert fit.is_share
     mean, covariance = fit.joint(points)
     assert mean.shape == (len(points),)
