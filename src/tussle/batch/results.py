@@ -443,8 +443,8 @@ class Results:
         except ParameterError:  # too few points for a curve
             return found
         name = found.over.name
-        placed = (replace(a, crossing=crossing_of(fit, asked, name, a.values)) for a in found.answers)
-        return replace(found, answers=tuple(placed))
+        with_fit = (replace(a, crossing=crossing_of(fit, asked, name, a.values)) for a in found.answers)
+        return replace(found, answers=tuple(with_fit))
 
     def select(self, text: str) -> list[int]:
         """The points at which variables have the values that a text such as "tactic=keep, prey_speed=20" names.
