@@ -24,7 +24,7 @@ from tussle.batch.default_quantities import (
 )
 from tussle.batch.quantities import Quantity, column_name, metric_of
 from tussle.batch.response import Response, fitted
-from tussle.batch.selection import is_number, known_point, paired_points, select_points, written
+from tussle.batch.selection import is_number, known_point, original, paired_points, select_points, with_unit
 from tussle.batch.sensitivity import Effect, effects, rank_effects
 from tussle.batch.statistics import (
     Mean,
@@ -38,11 +38,10 @@ from tussle.batch.statistics import (
 from tussle.batch.store import RUNS
 from tussle.batch.survival import N_TIMES, Survival, survival_of
 from tussle.batch.target import Answers, Layout, Target, answers_of, crossing_of
-from tussle.batch.variables import Choice, Range, Variable
+from tussle.batch.variables import Variable
 from tussle.batch.varied import variable_of
 from tussle.displays import counted, line, listing, page, table
 from tussle.errors import ParameterError, listed
-from tussle.mission.codecs import written as text_of
 from tussle.record.run import check_frames, frame_of, load_run
 
 if TYPE_CHECKING:
@@ -136,7 +135,7 @@ class Results:
         if not self.variables:
             return [{} for _ in first]
         rows = self.design.take(pa.array(first))
-        columns = [[_original(value, v) for value in rows[v.name].to_pylist()] for v in self.variables]
+        columns = [[original(value, v) for value in rows[v.name].to_pylist()] for v in self.variables]
         return [
             dict(zip((v.name for v in self.variables), values, strict=True))
             for values in zip(*columns, strict=True)
@@ -174,7 +173,7 @@ class Results:
     def label(self, point: int) -> str:
         """The values of a point: "prey_speed=23.4 kt, tactic=keep"; "" where nothing varies."""
         values = self.points[known_point(self.points, point)]
-        return ", ".join(f"{v.name}={_with_unit(values[v.name], v)}" for v in self.variables)
+        return ", ".join(f"{v.name}={with_unit(values[v.name], v)}" for v in self.variables)
 
     def title(self, expression: str) -> str:
         """A quantity with the teams by name: "score of keepers"."""
@@ -597,15 +596,3 @@ class Results:
 def _numbered(rows: np.ndarray) -> np.ndarray:
     """A number for each row, (n,), the same for equal rows."""
     return np.asarray(np.unique(rows, axis=0, return_inverse=True)[1]).ravel()
-
-
-def _original(value: Any, variable: Variable) -> Any:
-    """A value as it was given: a column of texts holds numbers and truth values as texts where others are texts."""
-    if isinstance(value, str) and isinstance(variable, Choice):
-        return next((given for given in variable.values if text_of(given) == value), value)
-    return value
-
-
-def _with_unit(value: Any, variable: Variable) -> str:
-    unit = variable.unit if isinstance(variable, Range) else ""
-    return f"{written(value)} {unit}" if unit else written(value)

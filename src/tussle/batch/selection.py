@@ -7,8 +7,9 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from tussle.batch.variables import Range, Variable
+from tussle.batch.variables import Choice, Range, Variable
 from tussle.errors import ParameterError, listed, nearest_name
+from tussle.mission.codecs import written as text_of
 
 Points = Sequence[Mapping[str, Any]]
 MOST_LISTED = 12
@@ -134,3 +135,16 @@ def _agree(value: Any, shown: str, variable: Variable) -> bool:
             return False
         return math.isclose(value, number, rel_tol=5e-6)
     return str(value) == shown
+
+
+def original(value: Any, variable: Variable) -> Any:
+    """A value as it was given: a column of texts holds numbers and truth values as texts where others are texts."""
+    if isinstance(value, str) and isinstance(variable, Choice):
+        return next((given for given in variable.values if text_of(given) == value), value)
+    return value
+
+
+def with_unit(value: Any, variable: Variable) -> str:
+    """A value as shown, with the unit of its variable."""
+    unit = variable.unit if isinstance(variable, Range) else ""
+    return f"{written(value)} {unit}" if unit else written(value)
