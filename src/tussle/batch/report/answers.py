@@ -175,7 +175,7 @@ def _how_it_goes(data: ReportData, lead: Measure, axis: FittedVariable) -> str:
     at = axis.spread(N_ALONG)
     fit = response.along(name, at)
     lowest, highest, last = int(np.argmin(fit.value)), int(np.argmax(fit.value)), len(at) - 1
-    unit = f" {axis.variable.unit}" if getattr(axis.variable, "unit", "") else ""
+    unit = f" {axis.unit}" if axis.unit else ""
     scale, sign = (100.0, " %") if lead.is_share else (1.0, "")
 
     def place(i: int) -> str:
@@ -199,14 +199,14 @@ def _how_it_goes(data: ReportData, lead: Measure, axis: FittedVariable) -> str:
 def _most_of_it(data: ReportData, response: Response, axis: FittedVariable, at: Sequence[Any]) -> str:
     """Where nine tenths of the change from the first place to the extreme one are done, for each value of a choice."""
     lines, texts = data.lines, []
-    is_split = lines is not None and len(lines.values) <= MOST_LINES_SAID
-    for held in lines.values if lines is not None and is_split else [None]:
-        value = response.along(
-            axis.variable.name, at, {} if held is None else {lines.variable.name: held}
-        ).value  # type: ignore[union-attr]
+    held: list[dict[str, Any]] = [{}]
+    if lines is not None and len(lines.values) <= MOST_LINES_SAID:
+        held = [{lines.variable.name: value} for value in lines.values]
+    for given in held:
+        value = response.along(axis.variable.name, at, given).value
         change = np.abs(value - value[0])
         place = number(float(f"{at[int(np.argmax(change >= MOST_OF_IT * change.max()))]:.4g}"))
-        texts.append(place if held is None else f"{place} with {written(held)}")
+        texts.append(" with ".join([place, *map(written, given.values())]))
     return " and ".join(texts)
 
 
