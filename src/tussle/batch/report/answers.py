@@ -29,7 +29,7 @@ LITTLE, MUCH = 0.2, 0.6
 
 
 @dataclass(frozen=True)
-class Answer:
+class ShortAnswer:
     """A question, and its answer in one or two sentences.
 
     Attributes:
@@ -43,7 +43,7 @@ class Answer:
     command: str = ""
 
 
-def answers(data: ReportData) -> list[Answer]:
+def answers(data: ReportData) -> list[ShortAnswer]:
     """Which choice, how many, what matters, when it went wrong, and whether it is luck; as far as the batch can tell."""
     if not data.n_good or not data.measures:
         return []
@@ -52,13 +52,13 @@ def answers(data: ReportData) -> list[Answer]:
     choices = [axis for axis in ranked if not axis.is_number][:MOST_ASKED]
     amounts = [axis for axis in ranked if axis.is_number][:MOST_ASKED]
     found = [
-        *(Answer(f"Which {_short(data, a)}?", text) for a in choices if (text := _which(data, lead, a))),
-        *(Answer(_how_many(data, a), text) for a in amounts if (text := _how_it_goes(data, lead, a))),
+        *(ShortAnswer(f"Which {_short(data, a)}?", text) for a in choices if (text := _which(data, lead, a))),
+        *(ShortAnswer(_how_many(data, a), text) for a in amounts if (text := _how_it_goes(data, lead, a))),
     ]
     extreme, command = _extreme_game(data, lead)
-    found.append(Answer("What matters?", _what_matters(data, lead)))
-    found.append(Answer("When did it go wrong?", f"{' '.join(_when(data))} {extreme}".strip(), command))
-    found.append(Answer("Is it luck?", _luck(data, lead)))
+    found.append(ShortAnswer("What matters?", _what_matters(data, lead)))
+    found.append(ShortAnswer("When did it go wrong?", f"{' '.join(_when(data))} {extreme}".strip(), command))
+    found.append(ShortAnswer("Is it luck?", _luck(data, lead)))
     return [each for each in found if each.text]
 
 
