@@ -77,6 +77,11 @@ class FittedVariable:
         return [int(value) if self.is_whole else float(value) for value in found]
 
     @property
+    def unit(self) -> str:
+        """Unit of its values; empty for none, and for choices."""
+        return self.variable.unit if isinstance(self.variable, Range) else ""
+
+    @property
     def is_whole(self) -> bool:
         """All values are whole numbers."""
         return self.is_number and all(float(value).is_integer() for value in self.values)
@@ -357,7 +362,7 @@ class Response:
 
     @cached_property
     def _others(self) -> np.ndarray:
-        return self._x[thinned(np.arange(len(self._x)), N_AROUND)]
+        return np.asarray(self._x[thinned(np.arange(len(self._x)), N_AROUND)])
 
     def _around(self, given: Mapping[str, Any], n: int = N_AROUND) -> np.ndarray:
         """Coordinates of points at which some variables are given, (n, n_axes); one if all are."""
@@ -365,7 +370,7 @@ class Response:
         for name, value in given.items():
             axis = self.axis(name)
             rows[:, self.axes.index(axis)] = axis.coordinates([value])[0]
-        return rows[:1] if len({*given}) == len(self.axes) else rows
+        return np.asarray(rows[:1] if len({*given}) == len(self.axes) else rows)
 
     def _joint(self, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         mean, covariance = self._mode.joint(rows)

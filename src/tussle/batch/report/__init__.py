@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from tussle.errors import MissingExtraError, RecordError
 
 if TYPE_CHECKING:
-    from tussle.batch.report.answers import Answer
+    from tussle.batch.report.answers import ShortAnswer
     from tussle.batch.report.drawing import Picture
     from tussle.batch.report.report_data import ReportData
     from tussle.batch.report.sections import Plot, Section
@@ -130,7 +130,7 @@ def write_page(
     version: str,
     source: str,
     answer: str,
-    answers: Sequence[Answer] = (),
+    answers: Sequence[ShortAnswer] = (),
     notes: Sequence[str] = (),
     needs: str = "The page needs no other file",
 ) -> Path:

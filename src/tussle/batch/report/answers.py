@@ -32,7 +32,7 @@ LITTLE, MUCH = 0.2, 0.6
 
 
 @dataclass(frozen=True)
-class Answer:
+class ShortAnswer:
     """A question, and its answer in one or two sentences.
 
     Attributes:
@@ -46,7 +46,7 @@ class Answer:
     command: str = ""
 
 
-def answers(data: ReportData) -> list[Answer]:
+def answers(data: ReportData) -> list[ShortAnswer]:
     """Which choice, how many, what matters, when it went wrong, and whether it is luck; as far as the batch can tell."""
     if not data.n_good or not data.measures:
         return []
@@ -55,20 +55,20 @@ def answers(data: ReportData) -> list[Answer]:
     choices = [axis for axis in ranked if not axis.is_number][:MOST_ASKED]
     amounts = [axis for axis in ranked if axis.is_number][:MOST_ASKED]
     found = [
-        *(Answer(f"Which {_short(data, a)}?", text) for a in choices if (text := _which(data, lead, a))),
-        *(Answer(_how_many(data, a), text) for a in amounts if (text := _how_it_goes(data, lead, a))),
+        *(ShortAnswer(f"Which {_short(data, a)}?", text) for a in choices if (text := _which(data, lead, a))),
+        *(ShortAnswer(_how_many(data, a), text) for a in amounts if (text := _how_it_goes(data, lead, a))),
     ]
     extreme, command = _extreme_game(data, lead)
-    found.append(Answer("What matters?", _what_matters(data, lead)))
-    found.append(Answer("When did it go wrong?", f"{' '.join(_when(data))} {extreme}".strip(), command))
-    found.append(Answer("Is it luck?", _luck(data, lead)))
+    found.append(ShortAnswer("What matters?", _what_matters(data, lead)))
+    found.append(ShortAnswer("When did it go wrong?", f"{' '.join(_when(data))} {extreme}".strip(), command))
+    found.append(ShortAnswer("Is it luck?", _luck(data, lead)))
     return [each for each in found if each.text]
 
 
-def further(question: Answers, results: Results) -> list[Answer]:
+def further(question: Answers, results: Results) -> list[ShortAnswer]:
     """Which runs would narrow the answer to the question of a target."""
     runs = further_runs(question, results.info, results.path)
-    return [Answer("What would narrow it?", f"{capital(what)}:", command) for what, command in runs]
+    return [ShortAnswer("What would narrow it?", f"{capital(what)}:", command) for what, command in runs]
 
 
 def _short(data: ReportData, axis: FittedVariable) -> str:
@@ -184,7 +184,7 @@ def _how_it_goes(data: ReportData, lead: Measure, axis: FittedVariable) -> str:
     at = axis.spread(N_ALONG)
     fit = response.along(name, at)
     lowest, highest, last = int(np.argmin(fit.value)), int(np.argmax(fit.value)), len(at) - 1
-    unit = f" {axis.variable.unit}" if getattr(axis.variable, "unit", "") else ""
+    unit = f" {axis.unit}" if axis.unit else ""
     scale, sign = (100.0, " %") if lead.is_share else (1.0, "")
 
     def place(i: int) -> str:
@@ -208,14 +208,14 @@ def _how_it_goes(data: ReportData, lead: Measure, axis: FittedVariable) -> str:
 def _most_of_it(data: ReportData, response: Response, axis: FittedVariable, at: Sequence[Any]) -> str:
     """Where nine tenths of the change from the first place to the extreme one are done, for each value of a choice."""
     lines, texts = data.lines, []
-    is_split = lines is not None and len(lines.values) <= MOST_LINES_SAID
-    for held in lines.values if lines is not None and is_split else [None]:
-        value = response.along(
-            axis.variable.name, at, {} if held is None else {lines.variable.name: held}
-        ).value  # type: ignore[union-attr]
+    held: list[dict[str, Any]] = [{}]
+    if lines is not None and len(lines.values) <= MOST_LINES_SAID:
+        held = [{lines.variable.name: value} for value in lines.values]
+    for given in held:
+        value = response.along(axis.variable.name, at, given).value
         change = np.abs(value - value[0])
         place = number(float(f"{at[int(np.argmax(change >= MOST_OF_IT * change.max()))]:.4g}"))
-        texts.append(place if held is None else f"{place} with {written(held)}")
+        texts.append(" with ".join([place, *map(written, given.values())]))
     return " and ".join(texts)
 
 

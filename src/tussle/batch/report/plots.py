@@ -351,8 +351,7 @@ def response_maps(
 
 def axis_label(axis: FittedVariable) -> str:
     """Name of a variable with its unit."""
-    unit = getattr(axis.variable, "unit", "")
-    return shortened(axis.variable.name, 44) + (f" [{shortened(unit, 12)}]" if unit else "")
+    return shortened(axis.variable.name, 44) + (f" [{shortened(axis.unit, 12)}]" if axis.unit else "")
 
 
 def _rows_of_marks(figure: Figure, plot: Axes, series: Sequence[Series], n_rows: int) -> None:

@@ -110,7 +110,7 @@ def _curves(data: ReportData, axis: FittedVariable, measures: Sequence[Measure])
         rows = np.array([(means[i].value, means[i].low, means[i].high) for i in chosen])
         if not _has_bars(data, axis):
             rows[:, 1:] = np.nan
-        dots.append(plots.Series(label, colour, marker, *rows.T, x))
+        dots.append(replace(plots.series_of(label, colour, marker, rows), x=x))
         response = data.response(measure)
         if response is not None:
             fit = response.along(name, at, given)
@@ -186,7 +186,7 @@ def _maps_of(
         unit = ", in percentage points" if low.is_share else ""
         label = f"◂ {shortened(low.name, 14)}  ·  {shortened(high.name, 14)} ▸"
         more = Measure(f"{high.expression}-{low.expression}", "", None, label, low.is_share)
-        kinds = [
+        kinds: list[tuple[str, str, str, Measure, tuple[str, ...]]] = [
             (
                 f"{stem}-map",
                 f"{capital(what)}, {title}",

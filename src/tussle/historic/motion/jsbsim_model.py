@@ -90,7 +90,7 @@ class JSBSimControl(SphericalEarth, jsbsim_model.JSBSimControl):
 
     def commands(self, u: np.ndarray) -> np.ndarray:
         """Return the inputs, within their limits."""
-        return np.clip(u, -1.0, 1.0)
+        return np.asarray(np.clip(u, -1.0, 1.0))
 
 
 def _turned(angle: np.ndarray) -> np.ndarray:
