@@ -19,7 +19,7 @@ from tussle.batch.selection import written
 from tussle.batch.statistics import mean_of, share_of, wilson
 from tussle.batch.variables import Choice, Range, Variable
 from tussle.errors import MissingExtraError
-from tussle.palette import MUTED, colour_of
+from tussle.palette import MUTED
 
 _TITLES = {
     "wins": "games won by {}",
@@ -53,6 +53,7 @@ class Measure:
         team: Its team; None if it belongs to no single team.
         label: Label of its axis.
         is_share: The quantity is 0 or 1 in each run.
+        colour: That of the team.
     """
 
     expression: str
@@ -60,10 +61,7 @@ class Measure:
     team: int | None
     label: str
     is_share: bool = False
-
-    @property
-    def colour(self) -> str:
-        return MUTED if self.team is None else colour_of(self.team)
+    colour: str = MUTED
 
     @property
     def marker(self) -> str:
@@ -252,6 +250,12 @@ class ReportData:
         """The name of a team."""
         return self.results.teams.get(team) or f"team {team}"
 
+    def _measure(self, name: str, team: int, label: str, is_share: bool = False) -> Measure:
+        """A quantity of a team."""
+        return Measure(
+            f"{name}[{team}]", self.name_of(team), team, label, is_share, self.results.colours[team]
+        )
+
     def title(self, expression: str) -> str:
         """The name of a quantity."""
         found = _OF_TEAM.fullmatch(expression)
@@ -353,15 +357,15 @@ class ReportData:
     def wins(self) -> tuple[Measure, ...]:
         """Wins of the teams that score or win; empty for games without scores."""
         teams = [t for t in self.rivals if t in self.results.scored] if len(self.results.scored) > 1 else []
-        return tuple(Measure(f"wins[{t}]", self.name_of(t), t, "share of the games won", True) for t in teams)
+        return tuple(self._measure("wins", t, "share of the games won", True) for t in teams)
 
     @cached_property
     def scores(self) -> tuple[Measure, ...]:
         """Scores of the teams; in games without scores, the entities left at the end of teams that lost some."""
         if self.rivals:
-            return tuple(Measure(f"score[{t}]", self.name_of(t), t, "score") for t in sorted(self.rivals))
+            return tuple(self._measure("score", t, "score") for t in sorted(self.rivals))
         teams = [t for t in self.results.diminished if varies(self.known(f"alive[{t}]"))]
-        return tuple(Measure(f"alive[{t}]", self.name_of(t), t, "left at the end") for t in teams)
+        return tuple(self._measure("alive", t, "left at the end") for t in teams)
 
     @cached_property
     def measured(self) -> tuple[Measure, ...]:

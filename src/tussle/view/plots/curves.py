@@ -9,7 +9,7 @@ import numpy as np
 
 from tussle.batch.report.drawing import rule_y, shortened
 from tussle.errors import ParameterError
-from tussle.palette import INK, MUTED, PAPER, colour_of, mixed
+from tussle.palette import INK, MUTED, PAPER, mixed
 from tussle.palette import TEAM_COLOURS as COLOURS
 from tussle.view.plots.selection import Selection, Trajectories
 from tussle.view.plots.sheet import Handle, add_head, line_look, line_sign, mark_sign, sheet, time_axis
@@ -128,9 +128,9 @@ def _teams_over_time(axes: Axes, tracks: Trajectories, values: np.ndarray) -> li
         _band(axes, tracks, values, team)
     for who, team, rows in tracks.each():
         if team not in many:
-            _line(axes, tracks, values, rows, alpha=0.85, **line_look(team, 0.8))
-            _cross(axes, tracks, values, who, rows, colour_of(team))
-    signs = [(line_sign(**line_look(team)), name) for team, name in tracks.teams.items()]
+            _line(axes, tracks, values, rows, alpha=0.85, **line_look(tracks, team, 0.8))
+            _cross(axes, tracks, values, who, rows, tracks.colours[team])
+    signs = [(line_sign(**line_look(tracks, team)), name) for team, name in tracks.teams.items()]
     if many:
         shades = (mixed(MUTED, PAPER, 0.45), mixed(MUTED, PAPER, 0.75))
         signs += [(line_sign(shades[0], 5.0), "half of a team"), (line_sign(shades[1], 5.0), "90 % of it")]
@@ -167,7 +167,7 @@ def _band(axes: Axes, tracks: Trajectories, values: np.ndarray, team: int) -> No
     for i, (begin, end) in enumerate(pairwise(edges)):
         if end > begin:
             bands[:, i] = np.quantile(found[begin:end], shares)
-    t, colour = tracks.frame_times[frames], colour_of(team)
+    t, colour = tracks.frame_times[frames], tracks.colours[team]
     axes.fill_between(t, bands[0], bands[4], color=colour, alpha=0.16, linewidth=0)
     axes.fill_between(t, bands[1], bands[3], color=colour, alpha=0.3, linewidth=0)
-    axes.plot(t, bands[2], **line_look(team))
+    axes.plot(t, bands[2], **line_look(tracks, team))

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tussle.batch.report.drawing import WIDTH, marker_of
-from tussle.palette import INK, MUTED, PAPER, colour_of, mixed
+from tussle.palette import INK, MUTED, PAPER, mixed
 from tussle.view.plots.selection import Trajectories
 from tussle.view.plots.sheet import Handle, add_head, line_sign, mark_sign, sheet
 from tussle.view.scenery import round_up
@@ -79,7 +79,7 @@ def density(tracks: Trajectories) -> Figure:
     edges = [_edges(low[i], high[i], step) for i in (0, 1)]
     lasts = _durations(tracks)[tracks.frame]
     team = np.repeat(tracks.team, np.diff(tracks.first))
-    parts = [(name, colour_of(number), team == number) for number, name in tracks.teams.items()]
+    parts = [(name, tracks.colours[number], team == number) for number, name in tracks.teams.items()]
     if len(parts) > MAX_MAPS:
         parts = [(f"all {len(parts)} teams", MUTED, np.ones(len(team), bool))]
     figure = sheet(height * len(parts))
@@ -88,7 +88,7 @@ def density(tracks: Trajectories) -> Figure:
         held = np.histogram2d(pos[rows, 0], pos[rows, 1], bins=edges, weights=lasts[rows])[0]
         _shade(figure, axes, held, edges, colour)
         _map_axes(axes, low, high)
-        axes.set_title(name, loc="left", fontsize=8.5, color=colour, pad=3.0)
+        axes.set_title(name, loc="left", fontsize=8.5, pad=3.0)
         axes.label_outer()
     add_head(figure, tracks, f"Time spent in cells of {step:g} m")
     return figure
@@ -158,14 +158,14 @@ def _draw_lines(axes: Any, tracks: Trajectories, by_team: list[tuple[int, list[n
         if not lines:
             continue
         drawn = kind(
-            lines, colors=colour_of(team), linewidths=_thinner(len(lines)), zorder=2.0 + 0.1 * order,
+            lines, colors=tracks.colours[team], linewidths=_thinner(len(lines)), zorder=2.0 + 0.1 * order,
             alpha=float(np.clip(4.0 / math.sqrt(len(lines)), 0.25, 1.0)), rasterized=n_points > MAX_POINTS,
         )  # fmt: skip
         axes.add_collection(drawn, autolim=False)
 
 
 def _team_signs(tracks: Trajectories) -> list[Handle]:
-    return [(line_sign(colour_of(team)), name) for team, name in tracks.teams.items()]
+    return [(line_sign(tracks.colours[team]), name) for team, name in tracks.teams.items()]
 
 
 def _thinner(n: int) -> float:
@@ -179,7 +179,7 @@ def _draw_ends(axes: Any, tracks: Trajectories, pos: np.ndarray, shown: np.ndarr
     small = float(np.clip(60.0 / math.sqrt(len(shown)), 0.8, 14.0))
     for team in tracks.teams:
         mine = shown[tracks.team[shown] == team]
-        colour, over = colour_of(team), {"zorder": 4.0, "rasterized": len(mine) > MAX_TRAJECTORIES // 4}
+        colour, over = tracks.colours[team], {"zorder": 4.0, "rasterized": len(mine) > MAX_TRAJECTORIES // 4}
         if axes.name == "3d":
             over["depthshade"] = False
         here = pos[tracks.first[mine]]
@@ -236,7 +236,7 @@ def _draw_scenery(axes: Axes, tracks: Trajectories) -> list[Handle]:
     for base in scenery.bases:
         place = np.array(base.position[:2])
         if _is_in_picture(place - base.radius, place + base.radius, corners):
-            colour = colour_of(base.team)
+            colour = tracks.colours[base.team]
             pale = mixed(colour, PAPER, 0.8)
             axes.add_patch(Circle((place[0], place[1]), base.radius, facecolor=pale, edgecolor=colour))
             signs["base"] = (mark_sign("o", MUTED, markersize=7.0, markerfacecolor="none"), "base")

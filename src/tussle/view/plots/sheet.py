@@ -17,7 +17,7 @@ from tussle.batch.report.drawing import (
     shortened,
 )
 from tussle.errors import ViewError
-from tussle.palette import MUTED, colour_of
+from tussle.palette import MUTED
 from tussle.view.plots.selection import Trajectories
 
 if TYPE_CHECKING:
@@ -77,9 +77,13 @@ def _game(tracks: Trajectories, n_letters: int) -> str:
     return shortened(recording.name, max(8, n_letters - len(about))) + about
 
 
-def line_look(team: int, linewidth: float = 1.4) -> dict[str, Any]:
+def line_look(tracks: Trajectories, team: int, linewidth: float = 1.4) -> dict[str, Any]:
     """Line options of a team's curves."""
-    return {"color": colour_of(team), "linestyle": DASHES[(team - 1) % len(DASHES)], "linewidth": linewidth}
+    return {
+        "color": tracks.colours[team],
+        "linestyle": DASHES[(team - 1) % len(DASHES)],
+        "linewidth": linewidth,
+    }
 
 
 def line_sign(color: str, linewidth: float = 1.6, **options: Any) -> Any:
