@@ -9,6 +9,7 @@ from typing import Any
 
 from tussle.palette import colour_in, colour_of, rgb_of, team_colours
 from tussle.view.shapes import MODELS
+from tussle.view.sight import Sight
 
 Colour = tuple[int, int, int]
 
@@ -50,6 +51,7 @@ class Style:
         plugins: Names of the classes of each block's plugins, which choose the model of a block without `visual_model`.
         viewer: Viewer tags of the mission file, see `tussle.mission.Loaded`.
         boxes: Lengths of each block's entities along their axes [m], (3,); None where they are no boxes.
+        views: What the plugins of each block see.
 
     Attributes:
         notes: Viewer tags that were not followed, one line each.
@@ -62,6 +64,7 @@ class Style:
         plugins: Sequence[Sequence[str]] = (),
         viewer: Mapping[str, Any] | None = None,
         boxes: Sequence[Sequence[float] | None] = (),
+        views: Sequence[Sequence[Sight]] = (),
     ) -> None:
         self.notes: list[str] = []
         self._teams = list(teams)
@@ -71,6 +74,7 @@ class Style:
         self._scales = [
             self._read_scale(name, s.get("visual_scale")) for name, s in zip(blocks, own, strict=True)
         ]
+        self._views = [*views, *[()] * (len(blocks) - len(views))]
         self._boxes = [*boxes, *[None] * (len(blocks) - len(boxes))]
         self._models = [
             self._read_model(
@@ -92,6 +96,10 @@ class Style:
     def model(self, block: int) -> str:
         """Name of the model of a block by its number, in `MODELS`."""
         return self._models[block]
+
+    def views(self, block: int) -> Sequence[Sight]:
+        """What the plugins of a block see, by its number."""
+        return self._views[block]
 
     def lengths(self, block: int) -> tuple[float, float, float]:
         """Lengths of an entity of a block along its axes [m]: factors by which its model, 1 m long, is enlarged."""

@@ -13,12 +13,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tussle.errors import ParameterError
+from tussle.record.run_file import mission_entry
 from tussle.view.frame import Event, Frame
 from tussle.view.live import Live
 from tussle.view.page.chunks import FULL_HEALTH, UNIT, pack, step_of
 from tussle.view.page.commands import LARGEST_ID, Command, game_commands, number, read_command, whole
 from tussle.view.page.document import event_rows
 from tussle.view.page.drawing import drawing_message
+from tussle.view.page.facts import mission_facts
 from tussle.view.page.failures import Failures
 from tussle.view.page.formatting import entity_sections, result_rows
 from tussle.view.page.packing import message
@@ -102,10 +104,18 @@ class FramePublisher:
 
     def document(self) -> dict[str, Any]:
         """Return the document of a live game."""
+        mission = self._live.simulation.mission
+        facts = [("Seed", str(self._live.seed)), *mission_facts(mission_entry(mission), self._live.teams)]
         return {
-            "source": "socket", "facts": [], "idShift": 0, "isComplete": True, "attitudeUnit": UNIT,
+            "source": "socket", "facts": facts, "endTime": mission.end if self._ends_by_time else None, "dt": mission.dt,
+            "idShift": 0, "isComplete": True, "attitudeUnit": UNIT,
             "healthSteps": FULL_HEALTH, "seed": min(self._live.seed, LARGEST_ID),
         }  # fmt: skip
+
+    @property
+    def _ends_by_time(self) -> bool:
+        mission = self._live.simulation.mission
+        return "time" in mission.end_conditions and math.isfinite(mission.end)
 
     @cached_property
     def _step(self) -> float:
@@ -201,7 +211,7 @@ class FramePublisher:
             "rate": sum(now - moment <= 1.0 for moment in self._moments),
             "notes": [*live.notes, *self._drawing_notes, *self._failures.texts], "error": None if error is None else str(error),
             "scores": {} if result is None else {str(k): float(v) for k, v in result.scores.items()},
-            "metrics": [] if result is None else result_rows(result), "events": self._new_events(reader),
+            "metrics": [] if result is None else result_rows(result, live.teams), "events": self._new_events(reader),
             "entity": self._entity(reader), "refusal": refusal, "steers": self._may_steer(reader),
         }  # fmt: skip
 

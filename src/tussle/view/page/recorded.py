@@ -9,12 +9,14 @@ from typing import Any
 
 import numpy as np
 
+from tussle import displays
 from tussle.errors import ParameterError, ViewError
 from tussle.mission import Mission
 from tussle.view.page.chunks import ANGLE_ERROR, FULL_HEALTH, UNIT, pack, position_error, step_of
 from tussle.view.page.compare import Comparison
 from tussle.view.page.document import event_rows, game_document, scenery_blobs
 from tussle.view.page.drawing import drawing_message
+from tussle.view.page.facts import mission_facts
 from tussle.view.page.packing import message, reals
 from tussle.view.recording import Recording
 
@@ -98,10 +100,10 @@ class RecordedData:
         facts += [
             (
                 "Frames",
-                grouped(len(self.kept))
-                + (f" of {grouped(len(game.t))}, one every {self._period:g} s" if self._period else ""),
+                f"{len(self.kept):,}"
+                + (f" of {len(game.t):,}, one every {self._period:g} s" if self._period else ""),
             ),
-            ("Entities", f"{grouped(self.n_entities)}, in {grouped(int(self.counts.sum()))} states"),
+            ("Entities", f"{self.n_entities:,}, in {int(self.counts.sum()):,} states"),
         ]
         return {
             **game_document(game, self._mission, self._viewer, self._title),
@@ -219,8 +221,9 @@ def game_facts(game: Recording | Comparison) -> list[tuple[str, str]]:
         both = (("A", game.a), ("B", game.b))
         return [(f"{name}: {key}", value) for name, run in both for key, value in game_facts(run)]
     info, t = game.run.info, game.t
+    named = lambda team: game.teams.get(int(team)) or f"team {team}"  # noqa: E731
     worlds = info.get("worlds", [])
-    facts = [("Run", game.path.resolve().name), ("Mission", game.name)]
+    facts = [("Run", game.path.resolve().name)]
     if game.world < len(worlds):
         world = worlds[game.world]
         facts.append(("Seed", str(world["seed"])))
@@ -228,18 +231,19 @@ def game_facts(game: Recording | Comparison) -> list[tuple[str, str]]:
             facts.append(("World", f"{game.world} of {len(worlds)}"))
         if world["scores"]:
             facts.append(
-                ("Score", ", ".join(f"team {team}: {score:g}" for team, score in world["scores"].items()))
+                (
+                    "Score",
+                    ", ".join(
+                        f"{named(team)}: {displays.number(float(score))}"
+                        for team, score in world["scores"].items()
+                    ),
+                )
             )
     facts.append(("Time", f"{t[0]:g} s to {t[-1]:g} s"))
     if info:
-        facts.append(("Step", f"{game.dt:g} s"))
+        facts += mission_facts(info["mission"], game.teams)
         facts.append(("Played by", f"tussle {info.get('versions', {}).get('tussle', '')}".strip()))
     return facts
-
-
-def grouped(count: int) -> str:
-    """Format a count with narrow spaces between thousands, as the page's script does."""
-    return f"{count:,}".replace(",", "\u202f")
 
 
 def compact_json(data: object) -> str:

@@ -75,6 +75,9 @@ export class Panels {
     this.showNotes([...new Set([...(error ? [error] : []), ...this.page.notes, ...notes])]);
     if (error) this.notice(error, true);
     fillList(byId('metrics'), metrics);
+    // It begins anew with another seed.
+    const facts = /** @type {[string, string][]} */ (this.page.facts.map(([name, value]) => [name, name === 'Seed' ? `${seed}` : value]));
+    fillList(document.querySelector('#info dl'), facts);
   }
 
   /**
@@ -222,7 +225,7 @@ export class Panels {
     const team = slot >= 0 ? layer.teams.get(layer.shown.team[slot]) || NO_TEAM : layer.teamOf(id);
     const nCaptures = layer.events.filter((event) => event.kind === 'capture' && event.id === id && event.t <= t).length;
     return [
-      ['Team', `${team.id} ${team.name}`.trim()],
+      ['Team', team.name || `team ${team.id}`],
       ...(slot >= 0 ? this.stateOf(slot) : [this.absence(id, t)]),
       .../** @type {[string, string][]} */ (nCaptures ? [['Captures', `${nCaptures}`]] : []),
     ];
