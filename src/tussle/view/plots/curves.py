@@ -134,7 +134,8 @@ def _teams_over_time(axes: Axes, tracks: Trajectories, values: np.ndarray) -> li
     if many:
         shades = (mixed(MUTED, PAPER, 0.45), mixed(MUTED, PAPER, 0.75))
         signs += [(line_sign(shades[0], 5.0), "half of a team"), (line_sign(shades[1], 5.0), "90 % of it")]
-    return signs + (_death_sign(tracks) if len(many) < len(count) else [])
+    is_marked = any(who in tracks.deaths and team not in many for who, team, _ in tracks.each())
+    return signs + (_death_sign(tracks) if is_marked else [])
 
 
 def _line(axes: Axes, tracks: Trajectories, values: np.ndarray, rows: slice, **options: Any) -> None:

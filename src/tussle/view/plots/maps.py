@@ -26,6 +26,10 @@ N_CELLS = 1200
 """Cells across a plot; of consecutive points in one cell one is drawn. More than the pixels of a PNG file."""
 MAX_MAPS = 6
 """Teams with a map of their own."""
+_ZOOM = 1.08
+"""Size of a flat scene in space."""
+MAX_SIGNS = 4
+"""Marks of teams beside each other in a legend."""
 LEAST_WIDTH = 10.0
 """Least width of a map [m]."""
 
@@ -42,7 +46,7 @@ def trajectory(tracks: Trajectories) -> Figure:
     lines = _lines(tracks, pos, shown, float((high - low).max()) / N_CELLS)
     _draw_lines(axes, tracks, lines)
     marks = _draw_ends(axes, tracks, pos, shown)
-    add_head(figure, tracks, "Trajectories from above", [*_team_signs(tracks), *marks, *scenery])
+    add_head(figure, tracks, "Trajectories from above", [*_team_signs(tracks, lines), *marks, *scenery])
     return figure
 
 
@@ -65,9 +69,10 @@ def trajectory3d(tracks: Trajectories) -> Figure:
     sides = np.maximum(seen / seen.max(), 0.25)  # none so short that its numbers lie over each other
     _space_look(axes, sides)
     what = "Trajectories in space" if times == 1.0 else f"Trajectories in space, heights times {times:g}"
-    add_head(figure, tracks, what, [*_team_signs(tracks), *marks])
+    add_head(figure, tracks, what, [*_team_signs(tracks, lines), *marks])
     figure.set_layout_engine("none")  # it would make the scene small
     axes.set_position((0.0, 0.0, 0.98, 0.94))
+    _centre(figure, axes, sides)
     return figure
 
 
@@ -164,8 +169,14 @@ def _draw_lines(axes: Any, tracks: Trajectories, by_team: list[tuple[int, list[n
         axes.add_collection(drawn, autolim=False)
 
 
-def _team_signs(tracks: Trajectories) -> list[Handle]:
-    return [(line_sign(tracks.colours[team]), name) for team, name in tracks.teams.items()]
+def _team_signs(tracks: Trajectories, by_team: list[tuple[int, list[np.ndarray]]]) -> list[Handle]:
+    """A line for each team, or a square for one of which no line is drawn, since nobody of it moved."""
+    has_lines = {team for team, lines in by_team if any(np.ptp(line, axis=0).any() for line in lines)}
+    return [
+        (line_sign(colour) if team in has_lines else mark_sign("s", colour, markersize=5.0), name)
+        for team, name in tracks.teams.items()
+        for colour in (tracks.colours[team],)
+    ]
 
 
 def _thinner(n: int) -> float:
@@ -196,8 +207,11 @@ def _draw_ends(axes: Any, tracks: Trajectories, pos: np.ndarray, shown: np.ndarr
             *pos[tracks.last[dead]].T, s=1.6 * small, marker="x", color=colour,
             linewidths=min(0.9, 0.25 * small), **over,
         )  # fmt: skip
-    signs = [(mark_sign("o", markerfacecolor=PAPER, markersize=3.5), "first")]
-    signs.append((mark_sign("o", markersize=4.5), "last"))
+    signs: list[Handle] = [(mark_sign("o", markerfacecolor=PAPER, markersize=3.5), "first")]
+    alive_teams = np.unique(tracks.team[shown[~has_died[shown]]]).tolist()
+    if alive_teams:
+        markers = [mark_sign(marker_of(team), tracks.colours[team], markersize=4.5) for team in alive_teams]
+        signs.append((tuple(markers[:MAX_SIGNS]), "last"))
     if has_died[shown].any():
         signs.append((mark_sign("x", markersize=4.0), "died"))
     return signs
@@ -265,7 +279,7 @@ def _space_look(axes: Any, sides: np.ndarray) -> None:
     """Set pane colours, a view from the south-east, and ticks that fit each axis."""
     from matplotlib.ticker import MaxNLocator
 
-    axes.set_box_aspect(sides.tolist(), zoom=1.08 - 0.3 * sides[2])  # as large as leaves room for the labels
+    axes.set_box_aspect(sides.tolist(), zoom=_ZOOM - 0.3 * sides[2])  # as large as leaves room for the labels
     axes.view_init(elev=26.0, azim=-58.0)
     axes.set(xlabel="east [m]", ylabel="north [m]", zlabel="up [m]")
     axes.zaxis.labelpad = -3.0
@@ -274,6 +288,22 @@ def _space_look(axes: Any, sides: np.ndarray) -> None:
         axis.line.set_linewidth(0.6)
         axis.set_major_locator(MaxNLocator(max(2, round(6 * side)), steps=[1, 2, 2.5, 5, 10]))
         axis.set_tick_params(labelsize=7, pad=0)
+
+
+def _centre(figure: Figure, axes: Any, sides: np.ndarray) -> None:
+    """Move a scene in space to the middle of its figure, and make it smaller until its labels lie on the figure."""
+    figure.draw_without_rendering()
+    room = np.array([figure.bbox.width, figure.legends[0].get_window_extent().y0])
+    for zoom in (_ZOOM - 0.3 * sides[2]) * 0.94 ** np.arange(12):
+        axes.set_box_aspect(sides.tolist(), zoom=zoom)
+        figure.draw_without_rendering()
+        boxes = [axis.get_tightbbox() for axis in (axes.xaxis, axes.yaxis, axes.zaxis)]
+        low, high = np.min([box.min for box in boxes], axis=0), np.max([box.max for box in boxes], axis=0)
+        place = axes.get_position()
+        shift = 0.5 * (room - low - high) / [figure.bbox.width, figure.bbox.height]
+        axes.set_position((place.x0 + shift[0], place.y0 + shift[1], place.width, place.height))
+        if (high - low <= 0.99 * room).all():
+            break
 
 
 def _edges(low: float, high: float, step: float) -> np.ndarray:
