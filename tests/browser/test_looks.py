@@ -63,6 +63,7 @@ def test_no_entity_lies_under_a_panel_in_the_overview(game, size, is_chosen):
         watched.press("o")
         watched.wait("player.status.entity && player.isDrawn && player.mode === 'overview'")
     panels = {name: watched.tab.evaluate(BOX, name) for name in ("head", "right", "bar")}
+    assert watched.tab.evaluate(BOX, "ticker")[3] <= panels["bar"][1]
     for who in watched.tab.evaluate("() => player.ids"):
         x, y = watched.tab.evaluate("(id) => player.pixelOf(id)", who)
         assert 0 <= x <= size[0]
@@ -187,7 +188,7 @@ def test_about_says_what_is_played(game):
     )
     watched.tab.keyboard.press("Escape")
     assert (said["Seed"], said["Step"], said["End"]) == ("3", "0.1 s", "30 s")
-    assert said["Team 2"] == "hunters: 3 entities planned"
+    assert said["Team 2"] == "hunters: 3 entities"
     assert said["Plugins of hunters"] == "Predator, Unicycle, FieldOfView"
     assert "SimpleCapture" in said["Plugins of the world"]
 

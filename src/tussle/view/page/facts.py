@@ -29,7 +29,7 @@ def mission_facts(mission: Mapping[str, Any], teams: Mapping[int, str]) -> list[
     blocks = mission["blocks"]
     for team, name in teams.items():
         n = sum(block.get("count") or 0 for block in blocks if block["team"] == team)
-        facts.append((f"Team {team}", f"{name}: {counted(n, 'entity', 'entities')} planned" if n else name))
+        facts.append((f"Team {team}", f"{name}: {counted(n, 'entity', 'entities')}" if n else name))
     facts += [(f"Plugins of {block['name']}", _plugins(block["plugins"])) for block in blocks[:MOST_BLOCKS]]
     if len(blocks) > MOST_BLOCKS:
         facts.append(("Plugins", f"of {counted(len(blocks) - MOST_BLOCKS, 'more block')} are not listed"))

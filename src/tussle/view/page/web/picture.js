@@ -2,7 +2,7 @@
 /** @import { View } from './types' */
 /** @import { Player } from './player.js' */
 
-import { byId, element, length, number, parseColour, say, styled } from './formatting.js';
+import { byId, element, length, parseColour, say, styled } from './formatting.js';
 import { add, between, minus, norm, scaled } from './geometry.js';
 import { pixelOf, placeBehind } from './camera.js';
 import { Renderer } from './renderer.js';
@@ -166,8 +166,7 @@ export class Picture {
     for (const { name, colour, top } of drawn.regions ? scenery.regions : []) overlay.writeAt(view, top, name, overlay.soft(colour), 12);
     for (const { name, colour, end } of drawn.grid ? scenery.ends : []) overlay.writeAt(view, end, name, overlay.soft(colour), 11, { gap: 3 });
     const { spacing, nearer } = scenery.cell(view);
-    const { ground, hasGround } = scenery.data;
-    const where = hasGround ? '' : ` at height ${number(ground)} m; this mission has no ground`;
+    const where = scenery.data.hasGround ? '' : ', no ground';
     say(byId('scale'), drawn.grid ? `grid ${length(nearer > 0.4 ? spacing : 10 * spacing)}${where}` : '');
   }
 

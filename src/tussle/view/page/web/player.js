@@ -166,7 +166,7 @@ export class Player {
     });
     slider.addEventListener('change', () => slider.blur());
     const sizes = new ResizeObserver(() => this.resize());
-    for (const node of [document.body, byId('head')]) sizes.observe(node);
+    for (const node of [document.body, byId('head'), byId('bar')]) sizes.observe(node);
     this.canvas.addEventListener('webglcontextlost', (event) => {
       event.preventDefault();
       this.sorry('The graphics card has dropped this page. Loading it again brings it back.');
