@@ -103,6 +103,7 @@ NEEDS = {
         _has_headers(*ROSCPP),
         "g++ libroscpp-dev libnav-msgs-dev libsensor-msgs-dev libgeometry-msgs-dev",
     ),
+    "rosnode": Need("rosnode", _has_program("rosnode"), "python3-rosnode python3-rosservice"),
     "rospy": Need("ROS 1", _has_rospy, ROSPY),
     "rostopic": Need("rostopic", _has_program("rostopic"), "python3-rostopic"),
     "stable_baselines3": Need(

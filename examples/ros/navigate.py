@@ -44,8 +44,14 @@ class Grid:
         row, column = cell
         return (column + 0.5) * self.cell - self.half_width, (row + 0.5) * self.cell - self.half_width
 
-    def add(self, pos: np.ndarray, angles: np.ndarray, ranges: np.ndarray, limit: float) -> None:
-        """Add a scan from pos [m], (2,): angles in the world frame [rad] and ranges [m]; those of `limit` [m] or more met nothing."""
+    def add(
+        self, pos: np.ndarray, angles: np.ndarray, ranges: np.ndarray, least: float, limit: float
+    ) -> None:
+        """Add a scan from pos [m], (2,): angles in the world frame [rad] and ranges [m] by REP 117.
+
+        A range of `limit` [m] or more met nothing, -inf met something nearer than `least` [m], and nan is unknown.
+        """
+        ranges = np.where(np.isneginf(ranges), least, ranges)
         rays = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
         along = np.arange(0.0, limit, 0.5 * self.cell)
         seen = along[None, :] < ranges[:, None] - self.cell
@@ -159,7 +165,7 @@ class Navigator:
             pos, yaw = self.pose
             ranges = np.array(message.ranges)
             angles = yaw + message.angle_min + message.angle_increment * np.arange(len(ranges))
-            self.grid.add(pos, angles, ranges, message.range_max)
+            self.grid.add(pos, angles, ranges, message.range_min, message.range_max)
             self.costs = self.grid.costs(self.radius)
             self.n_scans, self.scan_time = self.n_scans + 1, message.header.stamp.to_sec()
             if any(math.isinf(self.costs[cell]) for cell in self.path[4:]):

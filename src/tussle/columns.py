@@ -8,6 +8,7 @@ page all read this declaration.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Iterable
 from typing import Any
 
@@ -20,6 +21,7 @@ from tussle.errors import DeclarationError, ParameterError, UnitError, nearest_n
 PER = ("entity", "world", "team")
 MAX_NUMBER = 1e30
 """Largest finite number of a parameter: with larger ones, products of a few overflow."""
+WHOLE = re.compile(r"[+-]?[0-9]{1,20}")
 MOST_INTEGER = 2**53
 """All integers up to this magnitude are exact in float64."""
 
@@ -83,7 +85,10 @@ class Numbers(Column):
         text_units: Unit of a bare number in a text, for each component.
         dtype: float, int or bool.
         ragged: Whether each row holds a list, of any length, of items with these components; the array is a `RaggedColumn`.
+        recorded: Whether run directories have the column without being asked.
     """
+
+    recorded: bool = False
 
     def __init__(
         self, fields: str, unit: str, dtype: type, doc: str, ragged: bool = False, text_unit: str = ""
@@ -110,6 +115,14 @@ class Numbers(Column):
             self.fields
         ), f"[{self.unit}]" * bool(self.unit)
 
+    def _set_recorded(self, recorded: bool, per: str = "entity") -> None:
+        if recorded and (self.ragged or per != "entity"):
+            what = "a ragged column" if self.ragged else f"a column per {per}"
+            raise DeclarationError(
+                f"{type(self).__name__}: {what} is not recorded; recorded=True needs one value per entity"
+            )
+        self.recorded = recorded
+
     @property
     def shape(self) -> tuple[int, ...]:
         """Shape of one row's value, or of one item if ragged: () or (k,)."""
@@ -128,6 +141,8 @@ class Numbers(Column):
             return texts.items(text, parts, bool(self.fields), from_geodetic)
         if self.fields:
             return texts.row(text, parts)
+        if self.dtype is int and WHOLE.fullmatch(text.strip()):
+            return int(text)
         return texts.truth(text) if self.dtype is bool else units.parse(text, *parts[0][1:])
 
 
@@ -280,6 +295,8 @@ class Param(Numbers):
         number = int(value) if self.dtype is int else float(value)
         if not self.is_within(number):
             raise self._error(where, value, self.allowed())
+        if self.dtype is int and not -(2**63) <= number < 2**63:
+            raise self._error(where, value, f"{self.allowed()} of 64 bits")
         if MAX_NUMBER < abs(number) < math.inf:
             raise self._error(where, value, f"{self.allowed()} and of at most {MAX_NUMBER:g}")
         return number
@@ -321,6 +338,7 @@ class State(Numbers):
         per: "entity"; for world plugins also "world" or "team".
         ragged: One list per entity, initially empty; `fields` are the components of an item.
         doc: One-line description.
+        recorded: Whether run directories have the column without being asked; see `tussle.Recorder`.
     """
 
     def __init__(
@@ -332,8 +350,10 @@ class State(Numbers):
         per: str = "entity",
         ragged: bool = False,
         doc: str = "",
+        recorded: bool = False,
     ) -> None:
         super().__init__(fields, unit, dtype, doc, ragged)
+        self._set_recorded(recorded, per)
         if per not in PER:
             raise DeclarationError(f"State: per={per!r} is not one of {', '.join(PER)}")
         if ragged and (per != "entity" or default):
@@ -396,12 +416,15 @@ class Output(Channel):
 
     Args:
         finite: Whether all values are finite; False for a range that is inf where nothing is. The conformance kit checks it.
+        recorded: As of `State`.
     """
 
     def __init__(
         self, channels: str = "", unit: str = "", ragged: bool = False, fields: str = "", doc: str = "", finite: bool = True,
+        recorded: bool = False,
     ) -> None:  # fmt: skip
         super().__init__(channels, unit, ragged, fields, doc)
+        self._set_recorded(recorded)
         self.default = 0.0
         self.finite = finite
 

@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from tussle.errors import ParameterError
+from tussle.numeric import total
 from tussle.shapes import Volume, checked_number
 
 LEAST_CORNERS, MOST_CORNERS = 3, 1000
@@ -135,7 +136,7 @@ def _ears(corners: tuple[Corner, ...]) -> list[tuple[Corner, Corner, Corner]]:
     G. H. Meisters, Polygons have ears, The American Mathematical Monthly 82 (1975).
     """
     left = list(corners)
-    if sum(_turn((0.0, 0.0), a, b) for a, b in zip(left, left[1:] + left[:1], strict=True)) < 0.0:
+    if total(_turn((0.0, 0.0), a, b) for a, b in zip(left, left[1:] + left[:1], strict=True)) < 0.0:
         left.reverse()
     found = []
     while len(left) > 3:

@@ -10,14 +10,15 @@ from __future__ import annotations
 import itertools
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from tussle.errors import ParameterError
-from tussle.numeric import cos, sin
+from tussle.numeric import cos, sin, volumes
 
 Vector = tuple[float, float, float]
 Matrix = tuple[Vector, Vector, Vector]
@@ -87,13 +88,14 @@ class Convex(Volume):
 
     @cached_property
     def _face_columns(self) -> np.ndarray:
-        """Components of the normals and offset of each face, (4, faces, 1)."""
-        return np.array([(*normal, offset) for normal, offset in self._faces]).T[:, :, None]
+        """Components of the normals and offset of each face, (4, faces)."""
+        return np.array([(*normal, offset) for normal, offset in self._faces]).T.copy()
 
     def contains(self, pos: np.ndarray) -> np.ndarray:
-        east, north, up, offset = self._face_columns
-        inside: np.ndarray = (east * pos[0] + north * pos[1] + up * pos[2] < offset).all(axis=0)
-        return inside
+        return _applied(volumes.contained, (self._face_columns,), pos)
+
+    def crossed(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+        return _applied(volumes.crossed, (self._face_columns,), a, b)
 
     def inward(self, pos: np.ndarray) -> np.ndarray:
         """Opposite to the normals of the faces that a position lies beyond."""
@@ -104,9 +106,9 @@ class Convex(Volume):
 
     def outward(self, pos: np.ndarray) -> np.ndarray:
         """Of the face whose plane is nearest."""
-        east, north, up, offset = self._face_columns
+        east, north, up, offset = self._face_columns[:, :, None]
         face = (east * pos[0] + north * pos[1] + up * pos[2] - offset).argmax(axis=0)
-        return np.asarray(self._face_columns[:3, face, 0])
+        return np.asarray(self._face_columns[:3, face])
 
     def ray(self, origin: np.ndarray, direction: np.ndarray) -> np.ndarray:
         # T. L. Kay and J. T. Kajiya, Ray tracing complex scenes, SIGGRAPH 1986: a line is inside between its last entry through
@@ -298,9 +300,10 @@ class Sphere(Volume):
         object.__setattr__(self, "radius", checked_number(self, "radius", above=0.0))
 
     def contains(self, pos: np.ndarray) -> np.ndarray:
-        x, y, z = (p - c for p, c in zip(pos, self.center, strict=True))
-        inside: np.ndarray = np.sqrt(x * x + y * y + z * z) < self.radius
-        return inside
+        return _applied(volumes.sphere_contained, (self.center, self.radius), pos)
+
+    def crossed(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+        return _applied(volumes.sphere_crossed, (self.center, self.radius), a, b)
 
     def inward(self, pos: np.ndarray) -> np.ndarray:
         """Towards the centre."""
@@ -326,6 +329,14 @@ class Sphere(Volume):
         first = np.where(nearest - half >= 0.0, nearest - half, nearest + half)
         moving = direction[0] * direction[0] + direction[1] * direction[1] + direction[2] * direction[2] > 0.0
         return np.where(moving & (inward >= 0.0) & (first >= 0.0), first, np.inf)
+
+
+def _applied(law: Callable[..., None], shape: tuple[Any, ...], *points: np.ndarray) -> np.ndarray:
+    """What a kernel of a shape says of points or ways, (3, n) each: (n,)."""
+    flat = [np.ascontiguousarray(np.reshape(pos, (3, -1)), float) for pos in points]
+    out = np.empty(flat[0].shape[1], np.bool_)
+    law(*shape, *flat, out)
+    return out.reshape(np.shape(points[0])[1:])
 
 
 def checked_number(owner: object, name: str, above: float = -math.inf) -> float:

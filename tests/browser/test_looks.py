@@ -118,12 +118,12 @@ def test_the_inspector_is_in_the_window_and_can_be_read_to_its_end(game, size):
 def test_scores_and_teams_are_there_by_name(game, size):
     _, watched = game
     resized(watched, size)
-    watched.wait("player.status.scores['2'] > 0")
+    watched.wait("document.querySelector('#scores .score:not([hidden])')")
     scores = watched.tab.locator("#scores")
     assert scores.is_visible()
-    assert "hunters" in scores.locator(".score:visible").inner_text()
+    assert "hunters" in scores.locator(".score:visible").last.inner_text()
     assert watched.tab.locator("#teams .team span").first.inner_text().startswith("prey_of_the_north")
-    assert "prey_of_the_north, late: " in watched.tab.locator("#metrics").inner_text()
+    assert "prey_of_the_north, late 0" in watched.tab.locator("#metrics").inner_text()
     watched.press("ArrowRight")
     assert watched.tab.locator("#chosen dd").first.inner_text() == "prey_of_the_north, late"
 

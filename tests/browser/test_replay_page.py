@@ -93,3 +93,38 @@ def test_shapes_that_plugins_drew_are_seen_again(chromium, tmp_path):
         watched.wait("player.frame === 80 && player.shapes.length === 1")
         watched.close()
         assert not watched.trouble, "\n".join(watched.trouble)
+
+
+def test_columns_of_plugins_are_shown_beside_the_entity(chromium, tmp_path, monkeypatch):
+    monkeypatch.setattr(recorded_data, "SERVED_STATES", 60)
+    mission = hunt(n_prey=6, end=20.0, end_conditions="time")
+    with (
+        Simulation(mission, 3) as simulation,
+        Recorder(simulation, tmp_path / "run", columns="*.target,*.speed,*.Unicycle.x"),
+    ):
+        simulation.run()
+    recording = Recording(tmp_path / "run")
+    with Page(recording, is_paused=True) as page:
+        watched = Watched(chromium, page)
+        watched.wait("player.isDrawn")
+        watched.press("ArrowRight")
+        for frame in (30, 3):
+            watched.tab.locator("#time").evaluate(
+                "(s, t) => { s.value = String(t); s.dispatchEvent(new Event('input')); }", recording.t[frame]
+            )
+            watched.wait(f"player.frame === {frame} && player.isDrawn")
+            watched.wait("document.querySelectorAll('#sections section').length === 2")
+            who = watched.tab.evaluate("() => player.chosen")
+            row = recording.frame(frame).row_of(who)
+            titles = watched.tab.locator("#sections h3").all_inner_texts()
+            assert titles == ["Boids", "Unicycle"]
+            target = recording.values(frame, "Boids.target")[row]
+            shown = watched.tab.locator("#sections dd").all_inner_texts()
+            assert shown[0].endswith(" m")
+            assert [float(part.replace(",", "")) for part in shown[0][:-2].split()] == [
+                pytest.approx(value, rel=1e-3) for value in target
+            ]
+            assert shown[2].endswith("m m m rad rad")
+        assert watched.tab.locator("#sections dt").first.get_attribute("title") == "Current goal."
+        watched.close()
+        assert not watched.trouble, "\n".join(watched.trouble)

@@ -6,9 +6,14 @@ import pytest
 from pages import FENCE, PAGES, ROOT, examples, namespace, run
 
 IDS = [page.name for page in PAGES]
+SLOW = ("cluster.md", "optimize.md", "six-degrees.md")
+"""Pages that start a cluster, search, or compile a whole aircraft."""
 
 
-@pytest.mark.parametrize("page", PAGES, ids=IDS)
+@pytest.mark.parametrize(
+    "page",
+    [pytest.param(page, marks=pytest.mark.slow if page.name in SLOW else (), id=page.name) for page in PAGES],
+)
 def test_the_code_of_a_page_runs_and_prints_what_it_shows(page):
     module = namespace(page)
     for example in examples(page):

@@ -52,8 +52,8 @@ def test_there_are_some():
     }
 
 
-@pytest.mark.parametrize(("plugin", "upper", "lower"), plugins_that_divide())
-def test_a_range_without_width_is_refused(plugin, upper, lower):
-    least = plugin().values[lower]
-    with pytest.raises(ParameterError, match=f"{lower} must be smaller than {upper}"):
-        plugin(**{upper: least})
+def test_a_range_without_width_is_refused():
+    for plugin, upper, lower in plugins_that_divide():
+        least = plugin().values[lower]
+        with pytest.raises(ParameterError, match=f"{lower} must be smaller than {upper}"):
+            plugin(**{upper: least})

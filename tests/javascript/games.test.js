@@ -3,8 +3,10 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { Chunk, Moment } from '../../src/tussle/view/page/web/chunk.js';
-import { lastNotAfter, lastWhere, Layer } from '../../src/tussle/view/page/web/layer.js';
-import { append, Live } from '../../src/tussle/view/page/web/live.js';
+import { Layer } from '../../src/tussle/view/page/web/layer.js';
+import { lastNotAfter, lastWhere } from '../../src/tussle/view/page/web/ordered.js';
+import { SeriesBook, steps } from '../../src/tussle/view/page/web/series.js';
+import { Live } from '../../src/tussle/view/page/web/live.js';
 import { Recorded } from '../../src/tussle/view/page/web/recorded.js';
 import { chunkBytes, pageData, sourceOf } from './games.js';
 
@@ -16,9 +18,10 @@ async function recorded(failed = assert.ifError) {
   const text = JSON.stringify([[0, 'birth', 7, 0, 'drone'], [1, 'capture', 7, 9, ''], [1, 'death', 9, 7, ''], [2, 'death', 5, 0, 'fuel']]);
   const blobs = {
     times: new Uint8Array(new Float64Array([0, 1, 2, 3]).buffer), events: new TextEncoder().encode(text),
+    curves: new TextEncoder().encode(JSON.stringify([{ name: 'left', team: 1, id: 0, from: 0, t: [0, 2], v: [2, 1] }])),
     'chunk-0': chunkBytes(0, [0, 1, 2], [TRACKS[0], { id: 9, begin: 0, x: [100, 100] }]), 'chunk-1': chunkBytes(2, [2, 3], [{ id: 7, begin: 0, x: [4, 400] }]),
   };
-  const page = pageData({ nFrames: 4, nStates: 7, chunks: [[0, 2], [2, 3]], curves: { t: [], n: [[]] } });
+  const page = pageData({ nFrames: 4, nStates: 7, chunks: [[0, 2], [2, 3]] });
   const layer = new Recorded(page, sourceOf(blobs), nothing, failed);
   await layer.read();
   return layer;
@@ -104,6 +107,7 @@ test('trails lead back, of the dead too, and end at a jump', async () => {
 test('a capture tells of the death, and names come from births', async () => {
   const layer = await recorded();
   assert.deepEqual(layer.events.map(({ kind }) => kind), ['birth', 'capture', 'death']);
+  assert.equal(layer.series.of('left', 1).at(2.5), 1);
   assert.deepEqual(layer.marked.map(({ t, kind }) => [t, kind]), [[1, 'capture'], [2, 'death']]);
   assert.deepEqual([layer.who(7), layer.who(5), layer.teamOf(7).id, layer.teamOf(5).id], ['drone 7', '5', 1, 0]);
   assert.equal(new Layer(pageData({ idShift: 10 }), nothing).who(13), '3');
@@ -121,16 +125,14 @@ test('a live game keeps its frames, and forgets them when it jumps', () => {
   frame(1);
   frame(2);
   layer.advance(1);
-  assert.deepEqual([layer.show(), layer.end, layer.past.length, layer.curves.t], [true, 2, 2, [1, 2]]);
+  assert.deepEqual([layer.show(), layer.end, layer.past.length], [true, 2, 2]);
   assert.deepEqual(layer.velocity(7), [1, 0, 0]);
   layer.takePast({ epoch: 1, seconds: 5 }, chunkBytes(0, [0, 1], [{ id: 7, begin: 0, x: [0, 2] }, { id: 4, begin: 0, x: [90] }]));
   assert.deepEqual(layer.past.map(({ t }) => t), [0, 1, 2]);
   assert.equal(layer.who(4), 'drone 4', 'it was gone before the first frame');
   assert.deepEqual(layer.samples(1.5, 10).map(({ t }) => t), [1]);
-  layer.takePast({ epoch: 1, seconds: 1e9 }, chunkBytes(0, [0, 0.5], [{ id: 7, begin: 0, x: [0, 2] }]));
-  assert.deepEqual(layer.curves, { t: [0, 0.5, 1, 2], n: [[1, 1, 1, 1]] });
   frame(1, 2);
-  assert.deepEqual([layer.past.length, layer.curves.t], [1, [0, 0.5, 1]]);
+  assert.deepEqual([layer.past.length], [1]);
   layer.takePast({ epoch: 1, seconds: 5 }, new Uint8Array(0));
   assert.equal(layer.past.length, 1, 'what was asked for before the jump is not taken');
 });
@@ -188,22 +190,38 @@ test('the time line of a live game reaches to the end that its mission has', () 
   assert.equal(endless.horizon, 5);
 });
 
-test('events and scores of a live game grow, and are cut where it goes back', () => {
+test('events of a live game grow, and are cut where it takes another course', () => {
   const layer = new Live(pageData(), nothing);
-  const status = (t, from, rows, score) =>
-    layer.takeStatus(({ t, span: [0, 9], events: { from, rows }, scores: { 1: score } }));
-  status(1, 0, [[0.5, 'death', 3, 0, '']], 4);
-  status(2, 1, [[1.5, 'death', 4, 0, '']], 5);
-  assert.deepEqual([layer.marked.length, layer.scores.t, layer.scores.n], [2, [1, 2], [[4, 5]]]);
-  status(1, 1, [], 4);
-  assert.deepEqual([layer.marked.length, layer.scores.t], [1, [1]]);
+  const status = (t, from, rows) => layer.takeStatus(({ t, span: [0, 9], events: { from, rows } }));
+  status(1, 0, [[0.5, 'death', 3, 0, '']]);
+  status(2, 1, [[1.5, 'death', 4, 0, '']]);
+  assert.equal(layer.marked.length, 2);
+  status(1, 1, []);
+  assert.equal(layer.marked.length, 1);
 });
 
-test('curves keep no more than some hundred moments', () => {
-  const curves = { t: ([]), n: ([[]]) };
-  for (let i = 0; i < 5000; i++) append(curves, i, [i]);
-  assert.ok(curves.t.length <= 600 && curves.t.length > 250);
-  assert.deepEqual(curves.t, curves.n[0]);
+test('a quantity keeps its value until the next change, and later changes replace those that are wrong', () => {
+  const book = new SeriesBook();
+  const change = { name: 'left', team: 1, id: 0 };
+  book.take([{ ...change, from: 0, t: [0, 2, 5], v: [4, null, 3] }]);
+  const left = book.of('left', 1);
+  assert.deepEqual([-1, 0, 1.9, 2, 4, 5, 99].map((t) => left.at(t)), [NaN, 4, 4, NaN, NaN, 3, 3]);
+  assert.deepEqual([left.range(), left.range([0, 9])], [[3, 4], [0, 9]]);
+  book.take([{ ...change, from: 1, t: [1], v: [7] }]);
+  assert.deepEqual([left.t, left.v], [[0, 1], [4, 7]]);
+  assert.deepEqual([book.has('left', 2), book.of('left', 2).at(3)], [false, NaN]);
+});
+
+test('curves are steps, broken where a quantity is not known', () => {
+  /** @type {[string, number, number][]} */
+  const drawn = [];
+  globalThis.Path2D = class {
+    moveTo(x, y) { drawn.push(['move', x, y]); }
+    lineTo(x, y) { drawn.push(['line', x, y]); }
+  };
+  const same = (value) => value;
+  steps(({ t: [0, 2, 5, 6], v: [4, 1, NaN, 3] }), 7, same, same);
+  assert.deepEqual(drawn, [['move', 0, 4], ['line', 2, 4], ['line', 2, 1], ['line', 5, 1], ['move', 6, 3], ['line', 7, 3]]);
 });
 
 test('a place in an ordered list is found', () => {

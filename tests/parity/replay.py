@@ -17,6 +17,7 @@ class Flight:
 
     Attributes:
         error: Largest distance from the recorded position in each frame [m].
+        distance: The distance by frame and entity [m].
         turn: Largest difference of a quaternion's components in each frame.
         slip: Largest difference of a velocity's components in each frame [m/s].
         worst: (frame, id) where the position differs most.
@@ -26,6 +27,7 @@ class Flight:
     """
 
     error: dict[int, float] = field(default_factory=dict)
+    distance: dict[int, dict[int, float]] = field(default_factory=dict)
     turn: dict[int, float] = field(default_factory=dict)
     slip: dict[int, float] = field(default_factory=dict)
     worst: tuple[int, int] = (0, 0)
@@ -80,3 +82,4 @@ def _compare(flight: Flight, recording: Recording, frame: int, bodies: object) -
     if len(distance) and distance.max() > max(flight.error.values(), default=0.0):
         flight.worst = (frame, int(bodies.id[order][distance.argmax()]))
     flight.error[frame] = float(distance.max(initial=0.0))
+    flight.distance[frame] = dict(zip(bodies.id[order].tolist(), distance.tolist(), strict=True))

@@ -9,7 +9,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from recordings import Recording, load, mission
-from scipy import stats
 
 from tussle import Simulation
 
@@ -54,6 +53,8 @@ def recorded_left(recording: Recording, steps: int) -> np.ndarray:
 @pytest.mark.slow
 def test_losses_of_a_recording_are_among_those_of_200_seeds() -> None:
     """Of `straight`: who is left at the end, how long they were there in all, when the first were lost, and where they begin."""
+    from scipy.stats import ks_2samp
+
     recording = load("straight")
     first, left = played()
     wanted = recorded_left(recording, len(left))
@@ -64,4 +65,4 @@ def test_losses_of_a_recording_are_among_those_of_200_seeds() -> None:
     there = recording.pos[:, (recording.frame == 0) & (recording.team == 2)]
     is_scattered = np.arange(first.shape[1]) % there.shape[1] > 0
     for axis in range(3):
-        assert stats.ks_2samp(there[axis, 1:], first[axis, is_scattered]).pvalue >= LEVEL
+        assert ks_2samp(there[axis, 1:], first[axis, is_scattered]).pvalue >= LEVEL

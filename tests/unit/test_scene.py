@@ -258,6 +258,32 @@ def test_shapes_do_not_care_where_a_row_stands(shape: Volume) -> None:
 
 
 @pytest.mark.parametrize("shape", SHAPES, ids=lambda s: type(s).__name__)
+def test_kernels_say_what_arrays_say(shape: Volume) -> None:
+    """Bit for bit, at random places and at such that lie on surfaces, beside them, and nowhere."""
+    rng = np.random.default_rng(5)
+    n = 40_000
+    a = rng.normal(0.0, 5.0, (3, n))
+    b = a + rng.normal(0.0, 5.0, (3, n)) * rng.choice([0.0, 1e-9, 1.0], n)
+    a[:, : n // 4], b[:, : n // 4] = np.round(a[:, : n // 4]), np.round(b[:, : n // 4])
+    for k, odd in enumerate((np.nan, np.inf, -np.inf, 1e300, 1e-300)):
+        a[k % 3, k * 100 : k * 100 + 60] = odd
+        b[(k + 1) % 3, k * 100 + 40 : k * 100 + 100] = odd
+    with np.errstate(all="ignore"):
+        if isinstance(shape, Sphere):
+            x, y, z = (p - c for p, c in zip(a, shape.center, strict=True))
+            inside = np.sqrt(x * x + y * y + z * z) < shape.radius
+        else:
+            faces = shape.half_spaces()
+            inside = np.all([m[0] * a[0] + m[1] * a[1] + m[2] * a[2] < d for m, d in faces], axis=0)
+        way = Volume.crossed(shape, a, b)
+    assert (shape.contains(a) == inside).all()
+    assert (shape.crossed(a, b) == way).all()
+    assert 100 < way.sum() < n - 100
+    alone = [bool(shape.crossed(a[:, i], b[:, i])) for i in range(0, n, 1000)]
+    assert alone == way[::1000].tolist()
+
+
+@pytest.mark.parametrize("shape", SHAPES, ids=lambda s: type(s).__name__)
 def test_nan_is_nowhere(shape: Volume) -> None:
     lost = np.full((3, 1), np.nan)
     assert shape.contains(lost).tolist() == [False]

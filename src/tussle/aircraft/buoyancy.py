@@ -10,6 +10,7 @@ from tussle.aircraft.constants import SEA_LEVEL_PRESSURE, TEMPERATURES
 from tussle.aircraft.functions import content, emit_function, expression
 from tussle.aircraft.node import Element
 from tussle.errors import listed, nearest_name
+from tussle.numeric import total
 
 GAS_CONSTANT = 3.4071  # [ft lbf/mol/R]
 AIR = 0.0019186  # [slug/mol]
@@ -154,7 +155,7 @@ def gas_names() -> tuple[str, list[str], list[str]]:
 def emit_gas_mass(code: Code, cells: tuple[Bag, ...]) -> tuple[str, list[str], list[str]]:
     """Variables of mass [slug], moments [slug in] and inertia [slug ft^2] of the gas in the last step."""
     mass, moments, inertia = gas_names()
-    code.initial.setdefault(mass, sum(cell.contents * cell.gas[0] for cell in cells))
+    code.initial.setdefault(mass, total(cell.contents * cell.gas[0] for cell in cells))
     for name in (*moments, *inertia):
         code.initial.setdefault(name, 0.0)
     return code.read(mass), [code.read(each) for each in moments], [code.read(each) for each in inertia]

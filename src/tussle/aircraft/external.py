@@ -8,6 +8,7 @@ from tussle.aircraft.aerodynamics import WIND_TO_BODY, turned
 from tussle.aircraft.code import Code
 from tussle.aircraft.functions import emit_function
 from tussle.aircraft.node import Element
+from tussle.numeric import total
 
 LOCAL_TO_BODY = (("l11", "l12", "l13"), ("l21", "l22", "l23"), ("l31", "l32", "l33"))
 INERTIAL_TO_BODY = (("m11", "m12", "m13"), ("m21", "m22", "m23"), ("m31", "m32", "m33"))
@@ -50,7 +51,7 @@ def _emit_one(code: Code, node: Element) -> None:
         amount = code.read(size)
     direction = node.find("direction")
     ways = direction.vector("IN") if direction else (0.0, 0.0, 0.0)
-    length = math.sqrt(sum(way * way for way in ways)) or 1.0
+    length = math.sqrt(total(way * way for way in ways)) or 1.0
     vector = []
     for letter, way in zip(letters, ways, strict=True):
         code.initial.setdefault(f"{name}/{letter}", way / length)

@@ -12,6 +12,7 @@ from tussle.aircraft.constants import POUND_PER_SLUG
 from tussle.aircraft.equations import offer
 from tussle.aircraft.node import Element
 from tussle.aircraft.propulsion.bench import given
+from tussle.numeric import total
 
 Inertia = tuple[float, float, float, float, float, float]
 """xx, yy, zz, xy, xz, yz elements of the inertia matrix [slug ft^2]."""
@@ -57,7 +58,7 @@ def read_mass(node: Element) -> Mass:
         if each.find("form") is None:
             own = _inertia(each)
             inertia = tuple(a + b for a, b in zip(inertia, own, strict=True))  # type: ignore[assignment]
-    if not weight + sum(each.weight for each in points) > 0.0:
+    if not weight + total(each.weight for each in points) > 0.0:
         raise node.error("the aircraft has no weight")
     return Mass(weight, center.vector("IN") if center else (0.0, 0.0, 0.0), inertia, tuple(points))
 

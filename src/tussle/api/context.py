@@ -43,6 +43,7 @@ class Context:
         simulation: Returns the simulation, for code above the engine that a plugin calls.
         shared: Objects that handles of several entities use; their method `end` is called when the simulation is closed.
         boxes: Lengths of the boxes of each block for rays [m], (n_blocks, 3); 0 for spheres.
+        move: Places entities: move(rows, pos=, vel=, quat=, omega=) as `WorldView.move`; their motion models go on from there at once.
         mass_properties: Returns mass, inertia and weight of all rows of the body table.
         is_interrupted: Whether the user asked to stop; a plugin that waits for others then waits no longer.
     """
@@ -62,6 +63,7 @@ class Context:
     fail: Callable[[int, PluginError], None] = field(init=False)
     simulation: Callable[[], Any] = field(init=False)
     boxes: np.ndarray = field(init=False)
+    move: Callable[..., None] = field(init=False)
     mass_properties: Callable[[], MassProperties] = field(init=False)
     shared: dict[Hashable, Any] = field(default_factory=dict)
     is_interrupted: Callable[[], bool] = lambda: False

@@ -94,11 +94,29 @@ class WorldView(GroupView):
 
     # -- changes ----------------------------------------------------------------------------------------------------------
 
-    def kill(self, rows: Any, why: str) -> None:
-        """Remove entities at the end of this step, for the reason `why`. Until then they stay visible."""
-        rows = self._rows(rows)
+    def kill(self, rows: Any, why: str) -> np.ndarray:
+        """Remove entities at the end of this step, for the reason `why`. Until then they stay visible.
+
+        Args:
+            rows: Rows, (m,), or a mask of all rows, (n,).
+            why: The reason.
+
+        Returns:
+            Whether each of them is removed by this call and not by an earlier one in this step: (m,), or for a mask (n,). Of a row that
+            is given twice, the first counts.
+        """
+        given, rows = np.atleast_1d(np.asarray(rows)), self._rows(rows)
+        is_new = np.zeros(len(rows), bool)
+        is_new[np.unique(rows, return_index=True)[1]] = True
+        for before, _ in self.deaths:
+            is_new &= ~np.isin(rows, before)
         if len(rows):
             self.deaths.append((rows, why))
+        if given.dtype != bool:
+            return is_new
+        mask = np.zeros(len(given), bool)
+        mask[rows] = is_new
+        return mask
 
     def move(
         self,

@@ -34,6 +34,8 @@ class AutopilotLink(ABC):
         commands: The newest commands by number of the output; None before the first ones.
         failure: Why it cannot go on; empty if all is well.
         is_done: Whether the step may go on: the autopilot has answered its state, or without lockstep has been heard.
+        is_unanswered: Whether the step goes on with the commands before, without an answer, in lockstep.
+        has_restarted: Whether the autopilot has started anew, in this step.
     """
 
     def __init__(self, autopilot: str, lockstep: bool, timeout: float, release: Callable[[], object]) -> None:
@@ -42,6 +44,7 @@ class AutopilotLink(ABC):
         self.commands: dict[int, float] | None = None
         self.failure = ""
         self.is_done = False
+        self.is_unanswered = self.has_restarted = False
         self._silence, self._left = 0.0, time.monotonic()
 
     def fail(self, why: str) -> None:

@@ -32,6 +32,10 @@ class Autopilot(Autonomy):
     )
     for _channel, _unit in DRIVEN_CHANNELS.items():
         vars()[f"{_channel}_out"] = Output(_channel, unit=_unit, doc="Command.")
+    unanswered = State(
+        doc="Steps in lockstep that went on with the commands before, without an answer.", dtype=int
+    )
+    restarts = State(doc="How often the autopilot has started anew.", dtype=int)
     last_vel = State("x y z", unit="m/s", doc="Velocity at the last step, world frame.")
     link = Handle(doc="The connection with the autopilot.")
 
@@ -57,13 +61,20 @@ class Autopilot(Autonomy):
         """Close the sockets."""
         link.close()
 
+    def begin(self, g: GroupView, rows: np.ndarray) -> None:
+        """Begin with newborn rows; by default nothing."""
+
     def spawn(self, g: GroupView, rows: np.ndarray) -> None:
         """Start without acceleration."""
+        self.begin(g, rows)
         self.last_vel[:, rows] = g.bodies.vel[:, g.first + rows]
 
     def draws(self, g: GroupView) -> np.ndarray:
         """Standard normal numbers for the sensors of each row, (k, n)."""
         return np.empty((0, g.n))
+
+    def restart(self, g: GroupView, row: int) -> None:
+        """An autopilot has started anew; by default its vehicle goes on."""
 
     def step(self, g: GroupView) -> None:
         """Tell the autopilots where their vehicles are, and do as they say."""
@@ -80,6 +91,11 @@ class Autopilot(Autonomy):
         await_links(links, is_interrupted)
         for row, link in enumerate(links):
             link.leave()
+            self.unanswered[row] += link.is_unanswered
+            self.restarts[row] += link.has_restarted
+            if link.has_restarted:
+                self.restart(g, row)
+            link.is_unanswered = link.has_restarted = False
             if link.failure:
                 g.fail(row, link.failure)
             elif link.commands is not None:

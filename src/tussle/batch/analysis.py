@@ -8,7 +8,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from tussle.batch.quantities import column_name
 from tussle.batch.results import Results
 from tussle.batch.sensitivity import Effect
 from tussle.batch.statistics import Mean, PairedComparison, Share
@@ -132,15 +131,15 @@ def analyse(
 
     Args:
         results: The batch.
-        quantities: What is analysed; by default those of `Results.usual`.
+        quantities: What is analysed; by default those of `Results.defaults`.
         compare: Pairs of points, or of values that select points; by default the values of each choice with its first.
 
     Raises:
         ParameterError: There is no such quantity or point.
     """
     notes, info = list(results.notes), results.info
-    chosen = list(dict.fromkeys(quantities)) or results.usual
-    looked_at = list(dict.fromkeys(quantities)) or leading(results)
+    asked = list(dict.fromkeys(map(results.canonical, quantities)))
+    chosen, looked_at = asked or results.defaults.all, asked or results.defaults.leading
     has_points = len(results.points) > 1
     return Analysis(
         name=str(info["name"]),
@@ -164,17 +163,6 @@ def analyse(
         failures=_failures(results),
         notes=notes,
     )
-
-
-def leading(results: Results) -> list[str]:
-    """The default quantities of points and comparisons: scores, else what is measured, else numbers left, if they vary, else the time."""
-    scores = [column_name("score", team) for team in results.scored]
-    left = [column_name("alive", team) for team in results.diminished]
-    for names in (scores, [] if scores else results.measured, left):
-        found = [name for name in names if results.varies(name)]
-        if found:
-            return found
-    return ["t"]
 
 
 def _points(results: Results, quantities: Sequence[str]) -> list[PointResult]:

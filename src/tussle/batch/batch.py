@@ -44,6 +44,8 @@ from tussle.record.run_file import versions
 if TYPE_CHECKING:
     from tussle.batch.progress import Progress
     from tussle.batch.results import Results
+    from tussle.batch.sequential import Rule
+    from tussle.batch.target import Target
     from tussle.batch.until import Until
 
 MOST_CHECKED = 16
@@ -216,7 +218,7 @@ class Batch:
             raise BatchError(f"there is no run {number}; the batch has runs 0 to {self.plan.n_runs - 1}")
         return Simulation(self.missions[self.plan.point(number)], self.plan.seed(number), on_error="record")
 
-    def check(self, until: Until | None = None) -> None:
+    def check(self, until: Rule | None = None) -> None:
         """Start a game of each group, up to some number, and make its first steps, so that errors of the mission show at once.
 
         Errors of plugins are left to the runs, since they may depend on the seed.
@@ -245,7 +247,7 @@ class Batch:
                 missions,
                 self.plan.first_seed,
                 self.patience,
-                lambda results: until.width({name: results.quantity(name) for name in results.quantities}),
+                lambda results: until.check({name: results.quantity(name) for name in results.quantities}),
             )
             self._rules.add(str(until))
 
@@ -367,7 +369,7 @@ class Batch:
         plain = re.sub(r"[^A-Za-z0-9_.-]+", "_", self.name).strip("._") or "mission"
         return Path("batches") / f"{plain[:80]}-{self.fingerprint[:8]}"
 
-    def is_played_in(self, directory: str | Path, until: Until | None = None) -> bool:
+    def is_played_in(self, directory: str | Path, until: Rule | None = None) -> bool:
         """Return True if a directory has all runs of the batch.
 
         Raises:
@@ -404,6 +406,8 @@ class Batch:
         executor: Executor | None = None,
         *,
         until: str | Until | None = None,
+        target: str | Target | None = None,
+        over: str | None = None,
         command: Sequence[str] | None = None,
         on_progress: Callable[[Progress], None] | None = None,
     ) -> Results:
@@ -412,7 +416,9 @@ class Batch:
         Args:
             directory: Batch directory, which gets results as runs finish; None keeps all in memory.
             executor: Who plays; None chooses, see `executor`.
-            until: Stop when the interval of a result is narrow enough, such as "score[2]:0.5"; see `Until`.
+            until: Stop when the interval of a result is narrow enough, such as "score[2]:0.5"; see `Until` and `Width`.
+            target: Play what it takes to find the smallest value that reaches a target, such as "Guard.share >= 0.95"; see `Question`.
+            over: Name of the variable whose smallest value the target needs; None for the first range, or the first choice of numbers.
             command: The command that `batch.json` names.
             on_progress: Called after each finished run, and several times a second.
 
@@ -423,17 +429,16 @@ class Batch:
             TussleError: The mission cannot be played.
             BatchError: The directory holds another batch, or another process plays it.
             RecordError: The directory cannot be written.
+            ParameterError: `until` or `target` is written otherwise, or games have no such quantity.
         """
         from tussle.batch.runner import play_in_directory, play_in_memory
+        from tussle.batch.sequential import rule_of
 
-        if isinstance(until, str):
-            from tussle.batch.until import Until
-
-            until = Until.parse(until)
+        rule = rule_of(until, target, over)
         if directory is None:
-            return play_in_memory(self, executor, until, on_progress)
+            return play_in_memory(self, executor, rule, on_progress)
         return play_in_directory(
-            self, Path(directory), executor, until, list(command or sys.argv), on_progress
+            self, Path(directory), executor, rule, list(command or sys.argv), on_progress
         )
 
 

@@ -6,6 +6,7 @@ import ast
 import json
 import keyword
 import math
+import re
 import warnings
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field
@@ -28,6 +29,12 @@ def column_name(metric: str, team: int | None) -> str:
     )
     name = metric if is_plain else json.dumps(metric, ensure_ascii=False)
     return name if team is None else f"{name}[{team}]"
+
+
+def metric_of(name: str) -> str:
+    """The metric of the name of a column: "score" of "score[2]", "my metric.hits" of '"my metric.hits"[2]'."""
+    metric = re.sub(r"\[-?\d+\]$", "", name)
+    return str(json.loads(metric)) if metric.startswith('"') else metric
 
 
 @dataclass(frozen=True)
@@ -80,6 +87,15 @@ class Quantity:
         """
         found = (_column(metric, team, self.text, columns) for metric, team in _names(self._tree, self.text))
         return list(dict.fromkeys(found))
+
+    def canonical(self, columns: Collection[str]) -> str:
+        """The text; of a single name, the name of its column, so that one quantity has one text.
+
+        Raises:
+            ParameterError: There is no such column, or a team must be named.
+        """
+        names = self.names(columns)
+        return self.text if isinstance(self._tree, (ast.BinOp, ast.UnaryOp)) else names[0]
 
     def evaluate(self, columns: Mapping[str, np.ndarray]) -> np.ndarray:
         """Value for each run, (n,); NaN where a part is not known and where it divides by zero.

@@ -1,4 +1,4 @@
-"""Reads a batch directory: its results, and any of its runs to be played again."""
+"""Reads a batch directory: its results, and any of its runs to be played again; or a run directory, to be played again."""
 
 from __future__ import annotations
 
@@ -15,6 +15,8 @@ from tussle.batch.results import Results
 from tussle.batch.trust import DirectoryCode
 from tussle.errors import BatchError
 from tussle.mission import Loaded, Mission, PluginFile, read_mission
+from tussle.record.plugin_copies import copied_plugins
+from tussle.record.schema import MISSION_FILE, RUN, RUN_FILE
 
 OWN_OPTIONS = ("strict", "compat")
 """Options of `read_mission` that `batch.json` may set."""
@@ -31,19 +33,75 @@ def load_batch(path: str | Path) -> Results:
 
 @dataclass(frozen=True)
 class PlannedRun:
-    """One run of a batch, to be played again.
+    """One run of a batch or of a run directory, to be played again.
 
     Attributes:
         loaded: The mission file, read with the values of its point.
         mission: The mission.
         seed: The seed.
-        state_hash: State hash of the run in the batch; "" where it is not finished.
+        state_hash: State hash of the run there; "" where it is not finished.
+        origin: What it comes from: "batch" or "recording".
     """
 
     loaded: Loaded
     mission: Mission
     seed: int
     state_hash: str
+    origin: str = "batch"
+
+
+def recorded_run(
+    path: Path,
+    world: int = 0,
+    *,
+    may_run: Callable[[DirectoryCode], bool] = lambda code: code.is_own,
+    allow_large: bool = False,
+    search: Sequence[str | Path] = (),
+) -> PlannedRun:
+    """A world of a run directory, to be played again. Plugins are read from that directory only.
+
+    Args:
+        path: The run directory.
+        world: Number of the world.
+        may_run: Decides whether the plugin files of the directory may be run; by default those of the user's own runs may.
+        allow_large: As for `read_mission`; a directory cannot set it.
+        search: The same.
+
+    Raises:
+        BatchError: The run has no such world, or was killed, or its plugin files may not be run.
+        RecordError: It cannot be read.
+        MissionError: Its mission can no longer be read.
+    """
+    info = RUN.read(path / RUN_FILE) if (path / RUN_FILE).exists() else {}
+    worlds = info.get("worlds", [])
+    if not 0 <= world < len(worlds):
+        known = (
+            f"it has worlds 0 to {len(worlds) - 1}"
+            if worlds
+            else f"it has no {RUN_FILE}, as it was killed or goes on"
+        )
+        raise BatchError(f"{path}: world {world} cannot be played again; {known}")
+    code = DirectoryCode(path, copied_plugins(path))
+    if not (path / MISSION_FILE).resolve().is_relative_to(path.resolve()):
+        raise BatchError(f"{path}: {MISSION_FILE} is outside of the run directory, so it is not read")
+    if not may_run(code):
+        raise BatchError(f"{path}: {_not_known(code)}")
+    loaded = read_mission(
+        path / MISSION_FILE,
+        strict=False,  # it was read before, perhaps so
+        plugin_files=code.files,
+        search=search,
+        allow_large=allow_large,
+    )
+    is_timed = "time" in (info["mission"].get("end_conditions") or ())
+    mission = loaded.mission.ending_by_time() if is_timed else loaded.mission
+    said = worlds[world]
+    is_over = info["is_complete"] and said.get("state_hash")
+    return PlannedRun(loaded, mission, said["seed"], said["state_hash"] if is_over else "", "recording")
+
+
+def _not_known(code: DirectoryCode) -> str:
+    return f"not played, since its plugin code is not known to be yours: {code}; --trust runs it, with all your rights"
 
 
 def planned_run(
@@ -87,9 +145,7 @@ def planned_run(
         for name in read.texts:  # a neighbour may be a link
             _inside(path, str((plugin.parent / name).relative_to(path / store.MISSION)))
     if not may_run(code):
-        raise BatchError(
-            f"{path}: not played, since its plugin code is not known to be yours: {code}; --trust runs it, with all your rights"
-        )
+        raise BatchError(f"{path}: {_not_known(code)}")
     planned = results.design.slice(number, 1).to_pylist()[0]
     point = {v.name: planned[v.name] for v in results.variables}
     settings = {**about["settings"], **settings_of(point, results.variables)}

@@ -15,7 +15,15 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from tussle.batch import run_table
-from tussle.batch.quantities import Quantity, column_name
+from tussle.batch.default_quantities import (
+    COUNTED,
+    DefaultQuantities,
+    Telling,
+    default_quantities,
+    is_within_one,
+)
+from tussle.batch.quantities import Quantity, column_name, metric_of
+from tussle.batch.response import Response, fitted
 from tussle.batch.selection import is_number, known_point, paired_points, select_points, written
 from tussle.batch.sensitivity import Effect, effects, rank_effects
 from tussle.batch.statistics import (
@@ -28,6 +36,7 @@ from tussle.batch.statistics import (
     share_of,
 )
 from tussle.batch.survival import N_TIMES, Survival, survival_of
+from tussle.batch.target import Answers, Layout, Target, answers_of, crossing_of
 from tussle.batch.variables import Choice, Range, Variable
 from tussle.batch.varied import variable_of
 from tussle.displays import counted, line, listing, page, table
@@ -38,13 +47,6 @@ from tussle.record.run import check_frames, frame_of
 
 if TYPE_CHECKING:
     from tussle.batch.store import StoredBatch
-
-FIRST = ("wins", "ties", "score", "alive", "lost", "start", "t", "steps")
-"""Quantities that every game has, in the order in which they are listed; what plugins report comes behind."""
-
-
-MAX_MEASURED = 12
-"""Number of measured quantities that are looked at without being asked for."""
 
 
 class Results:
@@ -87,6 +89,7 @@ class Results:
                 f"{n_copies:,} of {self.n_runs:,} runs are copies of another run of their point: they end in the same state; "
                 f"intervals count distinct games ({self.n_distinct:,})"
             )
+        self._fits: dict[tuple[str, bool], Response] = {}
         self._columns = self._quantities_of(facts)
         names = [v.name for v in self.variables]
         keyed = run_table.with_values(facts, self.design, names, self._columns)
@@ -108,7 +111,7 @@ class Results:
                 columns[column_name("lost", team)] = start - left
         columns["t"], columns["steps"] = (run_table.floats(facts[name]) for name in ("t", "steps"))
         columns = metrics | columns
-        order = [column_name(metric, team) for metric in FIRST for team in (*self.teams, None)]
+        order = [column_name(metric, team) for metric in COUNTED for team in (*self.teams, None)]
         columns = {name: columns[name] for name in dict.fromkeys([*order, *columns]) if name in columns}
         return {name: np.where(self._is_failed, np.nan, values) for name, values in columns.items()}
 
@@ -157,7 +160,9 @@ class Results:
 
     @property
     def n_planned(self) -> int:
-        """Runs that were to be played."""
+        """Runs that were to be played; where points have different numbers of seeds, those that are finished."""
+        if self.info["is_complete"] and self.info.get("is_partial"):
+            return self.n_runs
         return int(self.info["n_runs"])
 
     @property
@@ -224,7 +229,7 @@ class Results:
         """Means of quantities with their intervals.
 
         Args:
-            expressions: What; by default those of `usual`.
+            expressions: What; by default those of `defaults`.
             point: Over the runs of this point; None for all runs.
 
         Raises:
@@ -232,20 +237,25 @@ class Results:
         """
         rows = self._rows(point)
         blocks, strata = self._blocks(rows, point)
-        chosen, are_copies = self.usual if expressions is None else expressions, not self._is_blocked(point)
+        chosen = self.defaults.all if expressions is None else expressions
+        are_copies = not self._is_blocked(point)
         return [
-            mean_of(text, self.quantity(text)[rows], blocks, strata, are_copies=are_copies) for text in chosen
-        ]
+            mean_of(
+                text, self.quantity(text)[rows], blocks, strata, are_copies=are_copies, is_share=self.is_share(text)
+            )
+            for text in chosen
+        ]  # fmt: skip
 
     def means_by_point(self, expression: str) -> list[Mean]:
         """The mean of a quantity at each point, without gathering its runs anew for each."""
-        values, n = self._by_point(self.quantity(expression)), range(len(self.points))
+        values, is_share = self._by_point(self.quantity(expression)), self.is_share(expression)
         if self._has_copies:
+            games = self._by_point(self._game)
             return [
-                mean_of(expression, values[i], games)
-                for i, games in zip(n, self._by_point(self._game), strict=True)
+                mean_of(expression, *of_point, is_share=is_share)
+                for of_point in zip(values, games, strict=True)
             ]
-        return means_of(expression, values)
+        return means_of(expression, values, is_share=is_share)
 
     def shares_by_point(self) -> list[list[Share]]:
         """Games that each team won at each point."""
@@ -281,34 +291,50 @@ class Results:
         ]
         return [*found, ("ties", None, "ties")] if found else []
 
-    @property
-    def usual(self) -> list[str]:
-        """The quantities that are looked at first.
+    @cached_property
+    def defaults(self) -> DefaultQuantities:
+        """The quantities that are shown if none are asked for."""
+        return default_quantities(self._columns, list(self.teams), self._varied)
 
-        Scores, or without them what metrics and interactions measure; what is left of teams that lost entities; and the time at the
-        end, if it varies or there is nothing else.
+    def telling(self, expressions: Sequence[str]) -> list[str]:
+        """Those of some quantities that vary and repeat neither a varied value nor one before them.
+
+        Raises:
+            ParameterError: There is no such quantity.
         """
-        names = [column_name("score", team) for team in self.scored] or self.measured
-        names += [column_name("alive", team) for team in self.diminished]
-        return [*names, "t"] if self.varies("t") or not names else names
+        return Telling({text: self.quantity(text) for text in expressions}, self._varied)(expressions)
 
     @property
-    def measured(self) -> list[str]:
-        """What metrics and interactions measure: those quantities that vary, or without any all; at most `MAX_MEASURED`."""
-        names = [name for name in self._columns if name.partition("[")[0] not in FIRST]
-        names = [name for name in names if np.isfinite(self._columns[name]).any()]
-        return ([name for name in names if self.varies(name)] or names)[:MAX_MEASURED]
+    def _varied(self) -> list[list[Any]]:
+        """Values of each variable, run by run."""
+        return [[self.points[i][v.name] for i in self._point.tolist()] for v in self.variables]
+
+    def canonical(self, expression: str) -> str:
+        """One text for each quantity: "score[2]" for " score[2]", "Cap.hits[1]" for "Cap.hits" where only team 1 has it.
+
+        Raises:
+            ParameterError: There is no such quantity.
+        """
+        return Quantity.parse(expression).canonical(self._columns)
+
+    def is_share(self, expression: str) -> bool:
+        """Return whether a quantity is a share: its interval is within 0 and 1.
+
+        So are wins and ties, and everything else whose values lie between 0 and 1 in all runs, but for what every game counts.
+
+        Raises:
+            ParameterError: There is no such quantity.
+        """
+        quantity = Quantity.parse(expression)
+        names = quantity.names(self._columns)
+        is_count = names == [expression] and metric_of(expression) in COUNTED
+        return quantity.is_share or (not is_count and is_within_one(quantity.evaluate(self._columns)))
 
     @property
     def diminished(self) -> list[int]:
         """The teams that lost entities in some run."""
         lost = {team: self._columns.get(column_name("lost", team)) for team in self.teams}
         return [team for team, values in lost.items() if values is not None and np.any(values > 0.0)]
-
-    def varies(self, name: str) -> bool:
-        """Return whether a quantity differs between runs."""
-        known = self._columns[name][np.isfinite(self._columns[name])]
-        return bool(len(known)) and bool(np.ptp(known) > 0.0)
 
     def compare(self, expression: str, a: int | str, b: int | str) -> PairedComparison:
         """Differences b - a of pairs of runs with the same seed; with independent seeds, in order of the runs.
@@ -333,7 +359,10 @@ class Results:
         if is_number(a) or is_number(b):
             names = (self.label(firsts[0]), self.label(seconds[0]))
         values = matrix[:, firsts].ravel(), matrix[:, seconds].ravel()
-        return paired_difference(expression, names, *values, blocks, strata, are_copies=not is_by_seed)
+        found = paired_difference(expression, names, *values, blocks, strata, are_copies=not is_by_seed)
+        if self.is_share(expression):
+            return replace(found, low=max(found.low, -1.0), high=min(found.high, 1.0))
+        return found
 
     def by_seed(self, expression: str) -> np.ndarray:
         """A quantity by seed and point, (n_seeds, n_points); NaN where it failed or is not finished."""
@@ -361,6 +390,32 @@ class Results:
         games[self._seed_index, self._point] = self._game
         return games
 
+    def answers(self, target: str | Target | None = None, over: str | None = None) -> Answers | None:
+        """The smallest value of a variable at which the mean of a quantity reaches a target, for each choice.
+
+        Args:
+            target: Such as "Guard.share >= 0.95"; None for that of the command that played the batch, if it had one.
+            over: Name of the variable; None for that of the command, else for the first range, else the first choice of numbers.
+
+        Raises:
+            ParameterError: There is no such quantity or variable, or the target is written otherwise.
+        """
+        if target is None and (target := self.info.get("target")) is None:
+            return None
+        asked = Target.parse(target) if isinstance(target, str) else target
+        layout = Layout.of(self.variables, self.points, over or self.info.get("over"))
+        expression = str(asked.quantity)
+        found = answers_of(asked, self.title(expression), layout, self.points, self.by_seed(expression))
+        if found.over is None:
+            return found
+        try:
+            fit = self.response(expression)
+        except ParameterError:  # too few points for a curve
+            return found
+        name = found.over.name
+        placed = (replace(a, crossing=crossing_of(fit, asked, name, a.values)) for a in found.answers)
+        return replace(found, answers=tuple(placed))
+
     def select(self, text: str) -> list[int]:
         """The points at which variables have the values that a text such as "tactic=keep, prey_speed=20" names.
 
@@ -376,7 +431,30 @@ class Results:
             ParameterError: There is no such quantity.
             MissingExtraError: The points were sampled for indices that take a package which is not there.
         """
-        return effects(self.variables, self.points, self.by_seed(expression), self._step)
+        return effects(
+            self.variables,
+            self.points,
+            self.by_seed(expression),
+            self._step,
+            lambda: self._fit(expression, is_share=False),
+        )
+
+    def response(self, expression: str) -> Response:
+        """A smooth fit of a quantity over all that varies, with its band.
+
+        Raises:
+            ParameterError: There is no such quantity, nothing varies, or too few points have runs.
+        """
+        return self._fit(expression, is_share=self.is_share(expression))
+
+    def _fit(self, expression: str, *, is_share: bool) -> Response:
+        key = (expression, is_share)
+        if key not in self._fits:
+            self._fits[key] = fitted(
+                self.variables, self.points, self.by_seed(expression),
+                is_share=is_share, has_own_seeds=bool(self.info["independent"]), what=expression,
+            )  # fmt: skip
+        return self._fits[key]
 
     def rank_correlations(self, expression: str) -> list[Effect]:
         """Same as `sensitivity` without parts of the variance; it needs no optional package."""

@@ -19,11 +19,12 @@ from tussle.batch.executors import Executor, InProcess, Processes
 from tussle.batch.plan import BatchPlan
 from tussle.batch.progress import Progress
 from tussle.batch.results import Results
+from tussle.batch.sequential import Question, Rule, SequentialStop
 from tussle.batch.stopping import Stop
 from tussle.batch.store import Store, StoredBatch
 from tussle.batch.tasks import BatchRun, Finished, Package
 from tussle.batch.trust import remember
-from tussle.batch.until import Until
+from tussle.batch.variables import Variable
 from tussle.batch.varied import entries_text
 from tussle.errors import BatchError
 from tussle.record.run_file import Timings, plain, versions
@@ -47,12 +48,14 @@ class Playable(Protocol):
     package: Package
     plugin_files: Any
 
+    variables: list[Variable]
+
     @property
     def fingerprint(self) -> str: ...
     def info(self) -> dict[str, Any]: ...
     def mission_files(self) -> dict[str, bytes]: ...
     def run(self, number: int) -> BatchRun: ...
-    def check(self, until: Until | None = None) -> None: ...
+    def check(self, until: Rule | None = None) -> None: ...
     def executor(self, *, n_runs: int) -> Executor: ...
 
 
@@ -67,14 +70,16 @@ class _Runner:
         stop: Decides when enough runs are played; None plays all.
         on_progress: Called with the progress.
         may_crash: Playing killed a process before, so runs are not played in this process.
+        n_asked: Seeds that are played at all points without a rule; None for all of the plan.
     """
 
     batch: Playable
     plan: BatchPlan
     keep: Callable[[Finished], None]
-    stop: Stop | None
+    stop: Stop | SequentialStop | None
     on_progress: Callable[[Progress], None] | None
     may_crash: bool = False
+    n_asked: int | None = None
 
     def __post_init__(self) -> None:
         self.progress = Progress(self.plan.n_runs)
@@ -90,6 +95,18 @@ class _Runner:
         if self.stop is None or self.stop.n_seeds is None:
             return self.plan
         return dataclasses.replace(self.plan, n_seeds=self.stop.n_seeds)
+
+    @property
+    def is_partial(self) -> bool:
+        """Some points are played with fewer seeds than others."""
+        if isinstance(self.stop, SequentialStop):
+            return True
+        return self.n_asked is not None and self.n_asked < self.final_plan.n_seeds
+
+    @property
+    def is_met(self) -> bool:
+        """The rule ended the batch."""
+        return self.stop.is_met if isinstance(self.stop, SequentialStop) else self.is_enough
 
     def play(self, played: Iterable[Finished], executor: Executor | None) -> None:
         """Play the missing runs.
@@ -138,7 +155,13 @@ class _Runner:
         A batch that may stop is played in small rounds at first, so that neither one group of points is played before the others
         nor many more runs than needed.
         """
-        n_points, n_seeds = self.plan.n_points, self.plan.n_seeds
+        if isinstance(self.stop, SequentialStop):
+            for needed in self.stop.rounds():
+                if runs := [self.batch.run(number) for number in needed if number not in done]:
+                    yield runs
+                done.update(needed)
+            return
+        n_points, n_seeds = self.plan.n_points, self.n_asked or self.plan.n_seeds
         most = max(1, MOST_AT_ONCE // n_points)
         first = 0
         while first < n_seeds:
@@ -156,14 +179,12 @@ class _Runner:
 def play_in_memory(
     batch: Playable,
     executor: Executor | None,
-    until: Until | None,
+    until: Rule | None,
     on_progress: Callable[[Progress], None] | None,
 ) -> Results:
     """Play a batch and write nothing to disk."""
     timings, kept = Timings(), files.MemoryStore()
-    runner = _Runner(
-        batch, batch.plan, kept.add, None if until is None else Stop(until, batch.plan), on_progress
-    )
+    runner = _Runner(batch, batch.plan, kept.add, _stop_of(until, batch, batch.plan), on_progress)
     runner.play((), executor)
     design = runner.final_plan.table()
     results, alive = files.tables(kept.played(), design)
@@ -175,7 +196,7 @@ def play_in_directory(
     batch: Playable,
     path: Path,
     executor: Executor | None,
-    until: Until | None,
+    until: Rule | None,
     command: Sequence[str],
     on_progress: Callable[[Progress], None] | None,
 ) -> Results:
@@ -201,8 +222,9 @@ def play_in_directory(
         played, notes = files.read_played(path)
         n_kept = 0 if before is None else _seeds_to_keep(path, played, before, until)
         plan = dataclasses.replace(batch.plan, n_seeds=max(batch.plan.n_seeds, n_kept))
-        stop = None if until is None else Stop(until, plan, n_kept)
-        runner = _Runner(batch, plan, store.add, stop, on_progress, store.was_killed)
+        n_asked = batch.plan.n_seeds if before is not None and before.get("is_partial") else None
+        stop = _stop_of(until, batch, plan, n_kept)
+        runner = _Runner(batch, plan, store.add, stop, on_progress, store.was_killed, n_asked)
         started = {
             "n_seeds_kept": n_kept,
             "is_complete": False,
@@ -225,7 +247,15 @@ def play_in_directory(
     return Results(files.load(path))
 
 
-def is_played(batch: Playable, path: Path, until: Until | None) -> bool:
+def _stop_of(
+    rule: Rule | None, batch: Playable, plan: BatchPlan, n_kept: int = 0
+) -> Stop | SequentialStop | None:
+    if isinstance(rule, Question):
+        return SequentialStop(rule, plan, batch.variables, n_kept)
+    return None if rule is None else Stop(rule, plan, n_kept)
+
+
+def is_played(batch: Playable, path: Path, until: Rule | None) -> bool:
     """All of a batch is in a directory already, undamaged.
 
     Raises:
@@ -265,17 +295,17 @@ def _shown(name: str, info: dict[str, Any]) -> str:
     return text if len(text) <= 80 else text[:77] + "..."
 
 
-def _has_all(before: dict[str, Any], plan: BatchPlan, until: Until | None) -> bool:
+def _has_all(before: dict[str, Any], plan: BatchPlan, until: Rule | None) -> bool:
     """Nothing is left to do."""
     if not before["is_complete"]:
         return False
     is_stopped = before.get("stopped_by") is not None
     if until is not None:
         return bool(before.get("until") == str(until) and (is_stopped or before["n_seeds"] >= plan.n_seeds))
-    return bool(before["n_seeds"] >= plan.n_seeds)
+    return not before.get("is_partial") and bool(before["n_seeds"] >= plan.n_seeds)
 
 
-def _seeds_to_keep(path: Path, played: pa.Table, before: dict[str, Any], until: Until | None) -> int:
+def _seeds_to_keep(path: Path, played: pa.Table, before: dict[str, Any], until: Rule | None) -> int:
     """Seeds that the batch has in any case, since games of them were asked for by another command and are finished.
 
     Those that the same command, before it was killed, had played beyond what is enough do not count: with them the batch would
@@ -309,12 +339,16 @@ def _write_tables(
 
 def _info(runner: _Runner, plan: BatchPlan, command: Sequence[str]) -> dict[str, Any]:
     """The entries of `batch.json` that are known when a batch begins."""
+    question = runner.stop.rule if isinstance(runner.stop, SequentialStop) else None
     return {
         **runner.batch.info(),
         "n_seeds": plan.n_seeds,
         "n_runs": plan.n_runs,
         "until": None if runner.stop is None else str(runner.stop.rule),
-        "stopped_by": str(runner.stop.rule) if runner.stop is not None and runner.is_enough else None,
+        "stopped_by": str(runner.stop.rule) if runner.stop is not None and runner.is_met else None,
+        "target": None if question is None or question.target is None else str(question.target),
+        "over": None if question is None else question.over,
+        "is_partial": runner.is_partial,
         "command": list(command),
         "versions": versions(),
     }

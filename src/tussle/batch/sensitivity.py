@@ -3,21 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from statistics import NormalDist
 from typing import Any
 
 import numpy as np
 
+from tussle.batch.response import Response, fitted
 from tussle.batch.statistics import BOOTSTRAP_FROM, LEVEL, SEED, scipy_package
-from tussle.batch.variables import Range, Variable
+from tussle.batch.variables import Variable
 from tussle.errors import MissingExtraError
 
-FROM_POINTS = 64
-"""Fewest points for RBD-FAST, which needs many points per harmonic: with 64 its error is 0.1, with 512 it is 0.03 (Ishigami function)."""
-N_HARMONICS = 4
-"""Harmonics of RBD-FAST. SALib's default of 10 adds noise at a few hundred points."""
+FROM_POINTS = 8
+"""Fewest points for parts of the variance by a fit, and four for each variable."""
 N_RESAMPLES = 200
 MOST_LEVELS = 30
 """Largest number of levels of a factor in an analysis of variance."""
@@ -33,7 +32,7 @@ class Effect:
     """Effect of a variable on a quantity.
 
     Attributes:
-        variable: Its name; also "interaction" and "seed".
+        variable: Its name; also "interaction", "seed" and "unexplained".
         rank_correlation: Spearman's rank correlation, -1 to 1; NaN for a variable without order.
         rank_low: Lower end of its interval.
         rank_high: Upper end.
@@ -43,7 +42,7 @@ class Effect:
         total: Share of the variance due to the variable and its interactions.
         total_low: Lower end of its interval.
         total_high: Upper end.
-        method: Method for the shares: "sobol", "rbd_fast", "levels", "anova", or "" if there are none.
+        method: Method for the shares: "sobol", "fit", "anova", or "" if there are none.
         note: The values and methods that were used, and their limits.
     """
 
@@ -69,7 +68,13 @@ class Effect:
         )
 
 
-def effects(variables: Sequence[Variable], points: Points, matrix: np.ndarray, step: int = 0) -> list[Effect]:
+def effects(
+    variables: Sequence[Variable],
+    points: Points,
+    matrix: np.ndarray,
+    step: int = 0,
+    fit: Callable[[], Response] | None = None,
+) -> list[Effect]:
     """Return the effect of each variable.
 
     Args:
@@ -77,6 +82,7 @@ def effects(variables: Sequence[Variable], points: Points, matrix: np.ndarray, s
         points: Its values at each point.
         matrix: The quantity by seed and point, (n_seeds, n_points); NaN if unknown.
         step: Points per base row of a Saltelli sample; 0 for other samples.
+        fit: Gives a fit of the quantity, not as a share; by default that of the matrix.
 
     Raises:
         MissingExtraError: The points are a Saltelli sample, and SALib is not installed.
@@ -89,7 +95,7 @@ def effects(variables: Sequence[Variable], points: Points, matrix: np.ndarray, s
     values = as_factorial([[p[v.name] for p in points] for v in variables], matrix)
     if values is not None and (len(variables) > 1 or len(matrix) > 1):
         return _by_anova(found, values, len(matrix))
-    return _by_given_data(found, variables, points, _means(matrix))
+    return _by_fit(found, variables, matrix, fit or (lambda: fitted(variables, points, matrix)))
 
 
 def _without_parts(found: Sequence[Effect], reason: str) -> list[Effect]:
@@ -159,7 +165,11 @@ def _means(matrix: np.ndarray) -> np.ndarray:
 
 
 def _by_saltelli(found: list[Effect], y: np.ndarray) -> list[Effect]:
-    """Return Saltelli's indices of a Saltelli sample."""
+    """Return Saltelli's indices of a Saltelli sample.
+
+    Raises:
+        MissingExtraError: SALib is not installed.
+    """
     k = len(found)
     rows = y.reshape(-1, k + 2)
     whole = rows[np.isfinite(rows).all(axis=1)]
@@ -170,7 +180,13 @@ def _by_saltelli(found: list[Effect], y: np.ndarray) -> list[Effect]:
     if len(whole) < 2 or np.ptp(whole) == 0.0:
         return _without_parts(found, "the quantity does not vary")
     problem = {"num_vars": k, "names": [e.variable for e in found], "bounds": [[0.0, 1.0]] * k}
-    indices = _salib("sobol").analyze(
+    try:
+        from SALib.analyze import sobol
+    except ImportError as error:
+        raise MissingExtraError(
+            f"parts of the variance need SALib, which is not installed: pip install 'tussle[batch]' ({error})"
+        ) from None
+    indices = sobol.analyze(
         problem, whole.ravel(), calc_second_order=False, num_resamples=N_RESAMPLES, seed=SEED
     )
     columns = (indices[name].tolist() for name in ("S1", "S1_conf", "ST", "ST_conf"))
@@ -180,87 +196,32 @@ def _by_saltelli(found: list[Effect], y: np.ndarray) -> list[Effect]:
     ]
 
 
-def _by_given_data(
-    found: list[Effect], variables: Sequence[Variable], points: Points, y: np.ndarray
+# -- a fit ------------------------------------------------------------------------------------------------------------------
+
+
+def _by_fit(
+    found: list[Effect], variables: Sequence[Variable], matrix: np.ndarray, fit: Callable[[], Response]
 ) -> list[Effect]:
-    """Return first-order indices of points of any sample."""
-    is_known = np.isfinite(y)
-    y, n = y[is_known], int(is_known.sum())
-    if n < FROM_POINTS or np.ptp(y) == 0.0:
+    """Return the parts of the variance of the runs by a smooth fit, for points of any sample."""
+    y = _means(matrix)
+    n, needed = int(np.isfinite(y).sum()), max(FROM_POINTS, 4 * len(variables))
+    if n < needed or np.nanmax(y) == np.nanmin(y):
         return _without_parts(
-            found, f"they take {FROM_POINTS} points" if n < FROM_POINTS else "the quantity does not vary"
+            found, f"they take {needed} points" if n < needed else "the quantity does not vary"
         )
-    note = f"part of the variance of {n} points' means, in which some seed noise is left"
-    done = []
-    for e, variable in zip(found, variables, strict=True):
-        values = [point[variable.name] for point, known in zip(points, is_known, strict=True) if known]
-        if not isinstance(variable, Range):
-            parts = (*correlation_ratio(values, y), None, None, None)
-            done.append(e.having(parts, "levels", f"{note}; between the values of the choice"))
-            continue
-        try:
-            first, half = _rbd_fast(np.array(values, dtype=np.float64), y)
-        except MissingExtraError as error:
-            done.append(replace(e, note=f"{e.note}; {error}"))
-            continue
-        done.append(
-            e.having((first, first - half, first + half, None, None, None), "rbd_fast", f"{note}; RBD-FAST")
-        )
-    return done
+    response = fit()
+    parts = dict(zip([axis.variable.name for axis in response.axes] + [""], response.parts(), strict=True))
+    is_seed = response.observed.noise is not None
+    note = f"parts of the variance of the runs by a smooth fit over {len(response.points)} points"
+    done = [
+        e.having((*parts[e.variable][0], *parts[e.variable][1]), "fit", note) if e.variable in parts else e
+        for e in found
+    ]
+    rest = Effect("seed" if is_seed else "unexplained", *(math.nan,) * 3)
+    return [*done, rest.having((*parts[""][0], None, None, None), "fit", note)]
 
 
-def _rbd_fast(x: np.ndarray, y: np.ndarray) -> tuple[float, float]:
-    """Return the first-order index of a variable from points of any sample, and half the width of its interval.
-
-    Not SALib's `delta`: its binned estimate finds 0.10 of 0.44 at 128 points of the Ishigami function, and it prints.
-    """
-    if np.ptp(x) == 0.0:
-        return 0.0, 0.0
-    problem = {"num_vars": 1, "names": ["x"], "bounds": [[0.0, 1.0]]}
-    found = _salib("rbd_fast").analyze(
-        problem, x[:, None], y, M=N_HARMONICS, num_resamples=N_RESAMPLES, seed=SEED
-    )
-    return float(found["S1"][0]), float(found["S1_conf"][0])
-
-
-def _salib(name: str) -> Any:
-    """A module of `SALib.analyze`.
-
-    Raises:
-        MissingExtraError: It is not installed.
-    """
-    try:
-        from SALib.analyze import rbd_fast, sobol
-    except ImportError as error:
-        raise MissingExtraError(
-            f"parts of the variance need SALib, which is not installed: pip install 'tussle[batch]' ({error})"
-        ) from None
-    return {"sobol": sobol, "rbd_fast": rbd_fast}[name]
-
-
-# -- choices and factorials -----------------------------------------------------------------------------------------------
-
-
-def correlation_ratio(labels: Sequence[Any], y: np.ndarray) -> tuple[float, float, float]:
-    """Return the share of the variance between the values of a choice, corrected for chance, and its interval.
-
-    Epsilon squared (Kelley, PNAS 21 (1935), 554-559); the interval is a bootstrap over points.
-    """
-    numbers = {label: i for i, label in enumerate(dict.fromkeys(labels))}
-    level = np.array([numbers[label] for label in labels])
-    draws = np.random.default_rng(SEED).integers(len(y), size=(N_RESAMPLES, len(y)))
-    low, high = np.quantile([_epsilon_squared(level[d], y[d], len(numbers)) for d in draws], (0.025, 0.975))
-    return _epsilon_squared(level, y, len(numbers)), float(low), float(high)
-
-
-def _epsilon_squared(level: np.ndarray, y: np.ndarray, n_levels: int) -> float:
-    n, centered = len(y), y - y.mean()
-    whole = float((centered**2).sum())
-    if n_levels < 2 or n <= n_levels or whole == 0.0:
-        return 0.0
-    count = np.bincount(level, minlength=n_levels)
-    between = float((np.bincount(level, centered, n_levels) ** 2 / np.maximum(count, 1)).sum())
-    return (between - (n_levels - 1) * (whole - between) / (n - n_levels)) / whole
+# -- factorials ------------------------------------------------------------------------------------------------------------
 
 
 def as_factorial(columns: Sequence[Sequence[Any]], matrix: np.ndarray) -> np.ndarray | None:

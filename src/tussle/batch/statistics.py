@@ -9,6 +9,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
+from statistics import NormalDist
 from typing import Any
 
 import numpy as np
@@ -210,6 +211,7 @@ def mean_of(
     strata: np.ndarray | None = None,
     *,
     are_copies: bool = False,
+    is_share: bool = False,
 ) -> Mean:
     """Mean of a quantity over runs.
 
@@ -220,8 +222,9 @@ def mean_of(
         strata: Number of the point that each run belongs to, (n,); None for runs of one point. The interval is that of the mean over
             these points: how they differ is no part of its width.
         are_copies: The runs of a block are copies of one run, so that no block goes over several points.
+        is_share: The quantity is a share, see `within_one`.
     """
-    mean = means_of(name, [values])[0]
+    mean = means_of(name, [values], is_share=is_share)[0]
     if (blocks is None and strata is None) or mean.n == 0:
         return mean
     is_known = np.isfinite(values)
@@ -230,8 +233,36 @@ def mean_of(
         low, high = stratified_interval(values[is_known], stratum, block)
     else:
         assert block is not None
-        low, high = mean_interval(block_values(values[is_known], block, stratum))
+        own = block_values(values[is_known], block, stratum)
+        low, high = (float(ends[0]) for ends in (_by_t if is_share else mean_intervals)(own[None, :]))
+    if is_share:
+        low, high = within_one(mean.value, low, high, mean.n if block is None else len(np.unique(block)))
     return replace(mean, low=low, high=high)
+
+
+def within_one(mean: float, low: float, high: float, n: int) -> tuple[float, float]:
+    """The interval of a mean of values between 0 and 1, which is within 0 and 1, too.
+
+    Wilson's interval, of as many runs that are 0 or 1 as have a mean with this variance (Kish, Survey Sampling (1965), 8.2; Korn and
+    Graubard, Survey Methodology 24 (1998), 193-201); of n such runs where the mean is 0 or 1.
+
+    Args:
+        mean: The mean.
+        low: Lower end of Student's interval of the mean; NaN if it is not known.
+        high: Its upper end.
+        n: Independent runs.
+    """
+    spread = mean * (1.0 - mean)
+    if spread > ROUNDING:
+        half = (high - low) / 2.0
+        ratio = half**2 / spread  # squared quantile over the number of runs
+    elif n > 1:
+        ratio = NormalDist().inv_cdf(0.5 + LEVEL / 2.0) ** 2 / n
+    else:
+        return math.nan, math.nan
+    centre = (mean + ratio / 2.0) / (1.0 + ratio)
+    half = math.sqrt(max(ratio * spread, 0.0) + ratio**2 / 4.0) / (1.0 + ratio)
+    return max(centre - half, 0.0), min(centre + half, 1.0)
 
 
 def stratified_interval(
@@ -264,12 +295,13 @@ def stratified_interval(
     return mean - half, mean + half
 
 
-def means_of(name: str, rows: Sequence[np.ndarray]) -> list[Mean]:
+def means_of(name: str, rows: Sequence[np.ndarray], *, is_share: bool = False) -> list[Mean]:
     """Mean of a quantity over the runs of each point; what `mean_of` gives for each, faster.
 
     Args:
         name: The quantity.
         rows: Its values for the runs of each point.
+        is_share: It is a share, see `within_one`.
     """
     known = [row[np.isfinite(row)] for row in rows]
     sizes = np.array([len(row) for row in known])
@@ -277,14 +309,15 @@ def means_of(name: str, rows: Sequence[np.ndarray]) -> list[Mean]:
     for n in np.unique(sizes).tolist():
         places = np.flatnonzero(sizes == n).tolist()
         same = np.array([known[i] for i in places])
-        low, high = mean_intervals(same)
+        low, high = (_by_t if is_share and n > 1 else mean_intervals)(same)
         nothing = np.full(len(same), np.nan)
         sd = same.std(axis=1, ddof=1) if n > 1 else nothing
         mean = same.mean(axis=1) if n else nothing
         quantiles = np.quantile(same, QUANTILES, axis=1).T if n else np.tile(nothing[:, None], len(QUANTILES))
         numbers = zip(places, *(v.tolist() for v in (mean, low, high, sd, quantiles)), strict=True)
         for i, m, lower, upper, spread, q in numbers:
-            found[i] = Mean(name, n, m, lower, upper, spread, dict(zip(QUANTILES, q, strict=True)))
+            ends = within_one(m, lower, upper, n) if is_share and n else (lower, upper)
+            found[i] = Mean(name, n, m, *ends, spread, dict(zip(QUANTILES, q, strict=True)))
     return [found[i] for i in range(len(rows))]
 
 

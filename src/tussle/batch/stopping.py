@@ -5,12 +5,63 @@ from __future__ import annotations
 import numpy as np
 
 from tussle.batch.plan import BatchPlan
-from tussle.batch.quantities import column_name
+from tussle.batch.quantities import Quantity, column_name
 from tussle.batch.tasks import Finished
 from tussle.batch.until import Until
 
 ROUND = 10
 """Seeds between two checks of the rule."""
+
+
+class PlayedQuantities:
+    """The quantities of finished runs, by seed and point.
+
+    Args:
+        plan: The runs.
+
+    Attributes:
+        columns: Name -> values, (room for seeds, n_points); NaN where a run failed or is not finished.
+        is_there: Which runs are finished, (room for seeds, n_points).
+    """
+
+    def __init__(self, plan: BatchPlan) -> None:
+        self.columns: dict[str, np.ndarray] = {}
+        self.is_there = np.zeros((0, plan.n_points), bool)
+
+    def add(self, finished: Finished) -> None:
+        """Add a run."""
+        seed, point = divmod(finished.number, self.is_there.shape[1])
+        self._make_room(seed + 1)
+        for name, value in quantities_of(finished).items():
+            if name not in self.columns:
+                self.columns[name] = np.full(self.is_there.shape, np.nan)
+            self.columns[name][seed, point] = value
+        self.is_there[seed, point] = True
+
+    def matrix(self, quantity: Quantity, n: np.ndarray) -> np.ndarray:
+        """A quantity by seed and point, (n_seeds, n_points), of the first n games of each point; NaN for all others.
+
+        Args:
+            quantity: The quantity; NaN everywhere where all games failed.
+            n: Games of each point, (n_points,).
+
+        Raises:
+            ParameterError: The runs have no such quantity.
+        """
+        n_seeds = int(n.max())
+        if not any(np.isfinite(values).any() for values in self.columns.values()):
+            return np.full((n_seeds, len(n)), np.nan)
+        values = quantity.evaluate({name: column[:n_seeds] for name, column in self.columns.items()})
+        return np.where(np.arange(n_seeds)[:, None] < n, values, np.nan)
+
+    def _make_room(self, n_seeds: int) -> None:
+        n_now = len(self.is_there)
+        if n_seeds <= n_now:
+            return
+        n_more = max(n_seeds, 2 * n_now) - n_now
+        self.is_there = np.pad(self.is_there, ((0, n_more), (0, 0)))
+        for name, values in self.columns.items():
+            self.columns[name] = np.pad(values, ((0, n_more), (0, 0)), constant_values=np.nan)
 
 
 class Stop:
@@ -30,22 +81,16 @@ class Stop:
     def __init__(self, rule: Until, plan: BatchPlan, n_least: int = 0) -> None:
         self.rule, self.plan, self.n_least = rule, plan, n_least
         self.n_seeds: int | None = None
-        self._columns: dict[str, np.ndarray] = {}  # by seed and point, (room for seeds, n_points)
-        self._is_there = np.zeros((0, plan.n_points), bool)
+        self._games = PlayedQuantities(plan)
         self._n_whole = 0  # seeds from the first on of which all points are there
 
     def add(self, finished: Finished) -> bool:
         """Take a finished run into account; true when the rule is met."""
         if self.n_seeds is not None:
             return True
-        seed, point = divmod(finished.number, self.plan.n_points)
-        self._make_room(seed + 1)
-        for name, value in quantities_of(finished).items():
-            if name not in self._columns:
-                self._columns[name] = np.full(self._is_there.shape, np.nan)
-            self._columns[name][seed, point] = value
-        self._is_there[seed, point] = True
-        while self._n_whole < len(self._is_there) and self._is_there[self._n_whole].all():
+        self._games.add(finished)
+        is_there = self._games.is_there
+        while self._n_whole < len(is_there) and is_there[self._n_whole].all():
             self._n_whole += 1
             if self._is_time(self._n_whole) and self._is_met(self._n_whole):
                 self.n_seeds = self._n_whole
@@ -58,17 +103,9 @@ class Stop:
     def _is_met(self, n_seeds: int) -> bool:
         points = range(self.plan.n_points)
         return self.rule.is_met(
-            {name: values[:n_seeds, point] for name, values in self._columns.items()} for point in points
+            {name: values[:n_seeds, point] for name, values in self._games.columns.items()}
+            for point in points
         )
-
-    def _make_room(self, n_seeds: int) -> None:
-        n_now = len(self._is_there)
-        if n_seeds <= n_now:
-            return
-        n_more = max(n_seeds, 2 * n_now) - n_now
-        self._is_there = np.pad(self._is_there, ((0, n_more), (0, 0)))
-        for name, values in self._columns.items():
-            self._columns[name] = np.pad(values, ((0, n_more), (0, 0)), constant_values=np.nan)
 
 
 def quantities_of(finished: Finished) -> dict[str, float]:

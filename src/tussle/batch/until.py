@@ -18,7 +18,8 @@ FEWEST_RUNS = 20
 """With fewer runs a standard deviation is too uncertain to stop by."""
 
 TAKES = (
-    "it takes WIDTH for the wins of all teams, or QUANTITY:WIDTH, such as 0.02, score[2]:0.5 or wins[2]:0.02"
+    "it takes WIDTH for the wins of all teams, QUANTITY:WIDTH, or 'width(QUANTITY) < WIDTH', such as 0.02, score[2]:0.5 or "
+    "'width(wins[2]) < 0.02'"
 )
 SIGN = re.compile(r":|±|\+/?-")
 """Stands before the width; ± and its spellings are those of earlier versions."""
@@ -91,6 +92,14 @@ class Until:
                 f"until {self}: these games have no scores, so nobody wins; name a quantity, as in t:0.5"
             )
         return max(_half(values, is_share=True) for values in wins)
+
+    def check(self, columns: Columns) -> None:
+        """See that runs have the result.
+
+        Raises:
+            ParameterError: They have not.
+        """
+        self.width(columns)
 
     def __str__(self) -> str:
         return f"{self.quantity}:{self.half_width!r}" if self.quantity else repr(self.half_width)

@@ -26,7 +26,7 @@ COLUMNS = ("run", "point", "seed")
 
 MODIFIERS = ("int", "log")
 WHOLE = re.compile(r"[-+]?\d{1,9}", re.ASCII)
-WHOLE_VALUE = re.compile(r"[-+]?\d{1,18}", re.ASCII)
+WHOLE_VALUE = re.compile(r"[-+]?\d{1,19}", re.ASCII)
 LARGEST_WHOLE = 10**15
 """Up to here a whole number plus one half is a float."""
 
@@ -246,7 +246,7 @@ def check_value(name: str, value: Any) -> None:
         wrong = "a choice is a text, a number, or true or false"
     elif isinstance(value, float) and not math.isfinite(value):
         wrong = "a number is finite"
-    elif isinstance(value, int) and abs(value) >= 2**63:
+    elif isinstance(value, int) and not -(2**63) <= value < 2**63:
         wrong = "whole numbers are allowed up to 2^63 - 1"
     else:
         return
@@ -312,7 +312,7 @@ def parse_values(name: str, text: str) -> Variable:
 
 def read_value(text: str) -> Value:
     """A text as a number where it is one."""
-    if WHOLE_VALUE.fullmatch(text):
+    if WHOLE_VALUE.fullmatch(text) and -(2**63) <= int(text) < 2**63:
         return int(text)
     match = QUANTITY.fullmatch(text) if len(text) <= LONGEST_TEXT else None
     is_number = match is not None and not match["unit"] and not match["number"].endswith("inf")

@@ -17,7 +17,7 @@ from tussle.batch.selection import written
 from tussle.batch.sensitivity import Effect
 from tussle.batch.statistics import PairedComparison, Share
 from tussle.batch.variables import Range, Variable
-from tussle.cli.batch import short_names
+from tussle.cli.batch import answer_tables, short_names
 from tussle.cli.batch_options import AnalyzeOptions, ReportOptions
 from tussle.cli.progress import home_short
 from tussle.cli.tables import Cell, Row, indented, number_tables, title
@@ -33,7 +33,9 @@ def report(options: ReportOptions) -> None:
     from tussle.batch.report import write_report
 
     directory = options.directory or options.batch / "report"
-    written_report = write_report(load_batch(options.batch), directory, options.quantities)
+    written_report = write_report(
+        load_batch(options.batch), directory, options.quantities, options.target, options.over
+    )
     for note in written_report.notes:
         say_note(note)
     n = len(written_report.plots)
@@ -51,11 +53,15 @@ def analyze(options: AnalyzeOptions) -> None:
         ParameterError: There is no such quantity or point.
     """
     compare = [options.compare] if options.compare else []
-    found = analyse(load_batch(options.directory), options.quantities, compare)
+    results = load_batch(options.directory)
+    found = analyse(results, options.quantities, compare)
     if options.as_json:
-        typer.echo(json.dumps(found.as_dict(), indent=1, allow_nan=False))
+        answers = results.answers(options.target, options.over)
+        target = {} if answers is None else {"target": answers.as_dict()}
+        typer.echo(json.dumps(found.as_dict() | target, indent=1, allow_nan=False))
         return
-    put("", *_parts(found, options.by_point), "")
+    heading, *parts = _parts(found, options.by_point)
+    put("", heading, *answer_tables(results, options.target, options.over), *parts, "")
     for note in found.notes:
         say_note(note)
 
@@ -74,10 +80,10 @@ def _parts(found: Analysis, shows_all_points: bool) -> Iterable[RenderableType]:
         yield _heading("who won", over)
         yield from _shares(found.shares)
     if any(mean.n for mean in found.means):
-        yield _heading("means", over)
+        yield _heading("means", f"{over}; sd: of the runs of a point" if over else "")
         yield from _means(found)
     if found.points:
-        won = "games won in %, " if any(share.n for share in found.shares) else ""
+        won = "games won in %, " if _winners(found) else ""
         yield _heading("points", f"{won}means ± half of their intervals")
         yield from _points(found, shows_all_points)
     for pairs in _by_quantity(found.comparisons):
@@ -118,6 +124,7 @@ def _shares(shares: Sequence[Share]) -> Iterable[RenderableType]:
 
 
 def _means(found: Analysis) -> Iterable[RenderableType]:
+    """Return means with their intervals; with points their extremes, else the quantiles of the runs."""
     rows: list[Row] = []
     for mean in found.means:
         digits = _digits(mean.high - mean.low, mean.value)
@@ -126,19 +133,29 @@ def _means(found: Analysis) -> Iterable[RenderableType]:
         cells: list[Cell] = [
             Text.assemble(mean.name, (f" {team}" if is_of_team else "", "dim")),
             _number(mean.value, digits),
-            _interval(mean.low, mean.high, digits) if mean.sd > 0.0 else "",
-            _number(mean.sd, digits),
+            _interval(mean.low, mean.high, digits) if mean.high > mean.low else "",
         ]
-        values = (mean.quantiles[q] for q in (0.05, 0.5, 0.95))
-        rows.append(("", [*cells, *(f"{value:.4g}" if math.isfinite(value) else "" for value in values)]))
-    return number_tables(["", "mean", "95 % interval", "sd", "q 5 %", "median", "q 95 %"], rows)
+        if found.points:
+            of_points = [m for point in found.points for m in point.means if m.name == mean.name and m.n]
+            spread = [m.sd**2 for m in of_points if m.n > 1]
+            sd = math.sqrt(sum(spread) / len(spread)) if spread else math.nan
+            extremes = [m.value for m in of_points] or [math.nan]
+            numbers = (sd, min(extremes), max(extremes))
+            cells += [_number(number, digits) for number in numbers]
+        else:
+            cells.append(_number(mean.sd, digits))
+            values = (mean.quantiles[q] for q in (0.05, 0.5, 0.95))
+            cells += [f"{value:.4g}" if math.isfinite(value) else "" for value in values]
+        rows.append(("", cells))
+    more = ["lowest point", "highest point"] if found.points else ["q 5 %", "median", "q 95 %"]
+    return number_tables(["", "mean", "95 % interval", "sd", *more], rows)
 
 
 # -- points -----------------------------------------------------------------------------------------------------------------
 
 
 def _points(found: Analysis, shows_all: bool) -> Iterable[RenderableType]:
-    winners = [share.name for share in found.shares if share.n]
+    winners = _winners(found)
     names = [mean.name for mean in found.points[0].means]
     units = [v.unit if isinstance(v, Range) else "" for v in found.variables]
     variables = [
@@ -161,6 +178,12 @@ def _points(found: Analysis, shows_all: bool) -> Iterable[RenderableType]:
     if n_between:
         text = f"{n_between:,} points between the highest and the lowest {names[0]} are left out; --by-point shows all"
         yield indented(Text(text, "dim"))
+
+
+def _winners(found: Analysis) -> list[str]:
+    """Return the teams that won, and ties; nothing if nobody won."""
+    has_winner = any(share.n for share in found.shares if share.team is not None)
+    return [share.name for share in found.shares if share.n and has_winner]
 
 
 def _selected(points: Sequence[PointResult], shows_all: bool) -> tuple[Sequence[PointResult], int]:

@@ -13,21 +13,24 @@ from contextlib import AbstractContextManager, ExitStack, nullcontext
 from pathlib import Path
 from typing import Any
 
+from rich.console import RenderableType
 from rich.padding import Padding
 from rich.text import Text
 
 from tussle.batch import store
-from tussle.batch.analysis import leading
 from tussle.batch.batch import Batch
 from tussle.batch.executors import Executor
+from tussle.batch.further import RUNS, further_runs
 from tussle.batch.progress import Progress as BatchProgress
+from tussle.batch.quantities import column_name
 from tussle.batch.reload import planned_run
 from tussle.batch.results import Results
 from tussle.batch.selection import written
+from tussle.batch.sequential import rule_of
 from tussle.batch.statistics import Share, running_result, scipy_package
 from tussle.batch.sweep_file import Sweep, read_sweep
+from tussle.batch.target import estimate_text
 from tussle.batch.trust import digest
-from tussle.batch.until import Until
 from tussle.batch.variables import Variable, parse_variable
 from tussle.cli.batch_options import BatchOptions
 from tussle.cli.interrupt import Interrupt, Interrupted
@@ -38,6 +41,7 @@ from tussle.cli.tables import estimate, fact_list, number_tables, title
 from tussle.cli.terminal import OK, PLUGIN_FAILED, RUNS_FAILED, put, say, say_error, say_note
 from tussle.errors import BatchError, ParameterError, RecordError
 from tussle.record import load_run
+from tussle.record.plugin_columns import select
 
 MOST_POINTS = 12
 """Points that the end of a batch shows; `tussle analyze` shows all."""
@@ -51,21 +55,29 @@ def batch(options: BatchOptions) -> int:
     """
     scipy_package()  # if it is missing, the user learns it before the games are played
     began = time.perf_counter()
-    until = None if options.until is None else Until.parse(options.until)
+    rule = rule_of(options.until, options.target, options.over)
     planned = batch_of(options)
     recorded = run_numbers(options.record_runs, planned.plan.n_runs)
+    for number in recorded:
+        select(planned.missions[planned.plan.point(number)], options.record_columns or "")
     directory = options.directory or planned.default_directory()
     with ExitStack() as stack:
         executor = None
-        if not planned.is_played_in(directory, until):
+        if not planned.is_played_in(directory, rule):
             with compiling():
-                planned.check(until)
+                planned.check(rule)
             executor = stack.enter_context(_executor(options, planned))
         interrupt = stack.enter_context(Interrupt())
         try:
-            with BatchMeter(planned, interrupt, has_total=until is None) as meter:
+            with BatchMeter(planned, interrupt, has_total=rule is None) as meter:
                 results = planned.play(
-                    directory, executor, until=until, command=command_line(), on_progress=meter.show_batch
+                    directory,
+                    executor,
+                    until=options.until,
+                    target=options.target,
+                    over=options.over,
+                    command=command_line(),
+                    on_progress=meter.show_batch,
                 )
             if meter.n_before:
                 n = min(meter.n_before, results.n_runs)
@@ -107,7 +119,7 @@ def batch_of(options: BatchOptions) -> Batch:
 
     made = Batch(
         options.mission,
-        runs=first(options.runs, sweep.runs, None if options.until is not None else 100),
+        runs=first(options.runs, sweep.runs, _most_runs(options)),
         vary=[*(v for v in sweep.variables if v.name not in names), *own] if sweep.points is None else (),
         points=sweep.points,
         sample=first(options.sample, sweep.sample, ""),
@@ -128,6 +140,11 @@ def batch_of(options: BatchOptions) -> Batch:
         ending_by_time(made.mission)
     show_notes(made.loaded)
     return made
+
+
+def _most_runs(options: BatchOptions) -> int | None:
+    """Games of each point where nobody says how many; None for as many as it takes."""
+    return RUNS if options.target is not None else None if options.until is not None else 100
 
 
 def _executor(options: BatchOptions, planned: Batch) -> AbstractContextManager[Executor | None]:
@@ -165,7 +182,7 @@ def run_numbers(text: str | None, n_runs: int) -> list[int]:
 def record_run(
     planned: Batch, options: BatchOptions, directory: Path, number: int, interrupt: Interrupt
 ) -> None:
-    """Play a run again and record it, unless it is recorded.
+    """Play a run again and record it, unless it is recorded with the same columns.
 
     Raises:
         BatchError: The run ended otherwise than in the batch.
@@ -173,7 +190,8 @@ def record_run(
     """
     target = directory / store.RUNS / f"{number:06d}"
     try:
-        if load_run(target).is_complete:
+        found = load_run(target)
+        if found.is_complete and options.record_columns in (None, found.info.get("columns")):
             return
     except RecordError:  # there is no run, or a damaged one
         pass
@@ -187,7 +205,7 @@ def record_run(
     )
     with (
         simulate(run.loaded, run.mission, run.seed) as simulation,
-        record(simulation, target, run.loaded) as recorder,
+        record(simulation, target, run.loaded, columns=options.record_columns) as recorder,
     ):
         simulation.run_until(lambda _: bool(interrupt.code))
         interrupt.check()
@@ -265,17 +283,18 @@ def show_batch(results: Results, directory: Path, wall: float, n_new: int) -> in
             ("run", "--from", f"{directory}:0"),
         )
     ]
-    stopped, cpu = info.get("stopped_by"), info["timings"]["cpu_s"]
+    cpu = info["timings"]["cpu_s"]
     played = f"{n_new:,} runs in {clock(wall)} ({times(n_new / wall)} runs/s), {cpu:,.1f} CPU s in all"
     put(
         "",
         title(info["name"], f"{facts} · {seeds_text(info['first_seed'], n_seeds)}"),
+        *answer_tables(results),
         *(point_tables(results) if has_points else []),
         *share_tables(results),
         Text(f" in parentheses: 95 % intervals{over}", "dim italic"),
         fact_list(
             [
-                ("stopped", f"{stopped} is reached with {info['n_seeds']:,} seeds" if stopped else ""),
+                ("stopped", _stopped(results)),
                 ("played", played if n_new else ""),
                 ("batch", str(directory)),
                 ("next", Text("\n".join(command))),
@@ -297,6 +316,16 @@ def show_batch(results: Results, directory: Path, wall: float, n_new: int) -> in
     return OK
 
 
+def _stopped(results: Results) -> str:
+    """What ended the batch early; "" for nothing."""
+    rule, n = results.info.get("stopped_by"), results.info["n_seeds"]
+    if not rule:
+        return ""
+    if not results.info.get("is_partial"):
+        return f"{rule} is reached with {n:,} seeds"
+    return f"{rule} is known, with up to {n:,} seeds at a point; it holds whenever the batch stops (confidence sequences)"
+
+
 def seeds_text(first: int, n: int) -> str:
     """Format a range of seeds: "seed 3", "seeds 1 to 1,000"."""
     return f"seed {first}" if n == 1 else f"seeds {first:,} to {first + n - 1:,}"
@@ -309,29 +338,29 @@ def short_names(variables: Sequence[Variable]) -> list[str]:
 
 
 def share_tables(results: Results) -> list[Padding]:
-    """Return one line per team, how often it won, its mean score, how many are left, and one per other usual quantity; with intervals."""
+    """Return one line per team, how often it won, its mean score, how many are left, and one per other quantity; with intervals."""
     shares = {share.team: share for share in results.shares()}
-    teams = results.teams if shares else {team: results.teams[team] for team in results.diminished}
+    word = "lost" if any(name.startswith("lost[") for name in results.defaults.all) else "left"
+    left = {team: column_name("lost" if word == "lost" else "alive", team) for team in results.diminished}
+    teams = results.teams if shares else {team: results.teams[team] for team in left}
     best = max((s.n for s in shares.values() if s.team is not None), default=0)
     rows = []
     for team, name in teams.items():
         share, cells = shares.get(team), [f"{team} {name}"]
         if shares:
             cells += ["", ""] if share is None else [f"{share.n:,}", _share(share)]
-            cells.append(_mean(results, f"score[{team}]"))
+            cells.append(_mean(results, column_name("score", team)))
         style = "green" if share is not None and share.n == best > 0 else ""
-        left = [_mean(results, f"alive[{team}]") if team in results.diminished else ""]
-        rows.append((style, [*cells, *(left if results.diminished else [])]))
-    head = ["team", *(["won", "share of wins, %", "mean score"] if shares else [])]
-    head += ["left"] if results.diminished else []
+        rows.append((style, [*cells, *([_mean(results, left.get(team, ""))] if left else [])]))
+    head = ["team", *(["won", "share of wins, %", "mean score"] if shares else []), *([word] if left else [])]
     if None in shares:
         cells = ["  ties", f"{shares[None].n:,}", _share(shares[None])]
         rows.append(("dim", [*cells, *[""] * (len(head) - len(cells))]))
-    shown = [
-        f"{metric}[{team}]" for metric in (["score", "alive"] if shares else ["alive"]) for team in teams
-    ]
+    in_rows = [*left.values(), *(column_name("score", team) for team in teams if shares)]
     others = [
-        ("", [results.title(name), _mean(results, name)]) for name in results.usual if name not in shown
+        ("", [results.title(name), _mean(results, name)])
+        for name in results.defaults.all
+        if name not in in_rows
     ]
     return [
         *(number_tables(head, rows) if rows else []),
@@ -351,11 +380,48 @@ def _mean(results: Results, name: str) -> str:
     return estimate(mean.value, mean.low, mean.high) if mean.n else ""
 
 
+def answer_tables(
+    results: Results, target: str | None = None, over: str | None = None
+) -> list[RenderableType]:
+    """Return the answer to the question of a target, the values behind it, and the commands that would narrow it; nothing without one."""
+    answers = results.answers(target, over)
+    if answers is None:
+        return []
+    names = list(answers.answers[0].values)
+    head = [
+        *names,
+        *([answers.over.name] if answers.over else []),
+        "games",
+        answers.title,
+        "95 % interval",
+        "target",
+    ]
+    rows = []
+    for answer in answers.answers:
+        for level in answer.levels:
+            mean, _, interval = estimate_text(level).partition(" (")
+            style = "green" if level is answer.smallest else "dim" if level.state == "missed" else ""
+            cells = [*map(written, answer.values.values()), *([level.text] if answers.over else [])]
+            rows.append((style, [*cells, f"{level.n:,}", mean, interval.removesuffix(")"), level.state]))
+    held = "the intervals of a choice hold together, and whenever one stops: 95 % (confidence sequences, Bonferroni)"
+    found: list[RenderableType] = [Text(f" {sentence}", "bold") for sentence in answers.sentences()]
+    found += [
+        *number_tables(head, rows),
+        *(Text(f" {note}", "dim italic") for note in (held, *answers.notes)),
+    ]
+    for what, command in further_runs(answers, results.info, results.path):
+        found += [Text(f" {what}:", "dim"), Text(f" {command}", no_wrap=True)]
+    return found
+
+
 def point_tables(results: Results) -> list[Padding]:
-    """Return one line per point: its values, and who won how often there, or the leading quantities where nobody wins."""
-    winners = [share for share in results.shares() if share.n]
+    """Return one line per point: its values, who won how often there, and the leading quantities, without scores where somebody wins."""
+    shares = results.shares()
+    has_winner = any(share.n for share in shares if share.team is not None)
+    winners = [share for share in shares if share.n and has_winner]
     teams = [share.team for share in winners]
-    means = {} if winners else {name: results.means_by_point(name) for name in leading(results)}
+    names = [n for n in results.defaults.leading if not (winners and n.startswith("score["))]
+    means = {name: results.means_by_point(name) for name in names}
     head = ["point", *short_names(results.variables), *(f"{share.name} won, %" for share in winners)]
     head += map(results.title, means)
     rows = [

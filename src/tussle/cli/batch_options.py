@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from tussle.cli.options import LARGEST_SEED, MissionOptions, argument, flag, option
+from tussle.cli.options import LARGEST_SEED, MissionOptions, argument, columns_option, flag, option
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,7 +69,23 @@ class BatchOptions(ManyGamesOptions):
         str | None,
         option(
             "WIDTH",
-            "Stop when half of a 95 % interval is this narrow: 0.02 (share of wins of each team), 'score[2]:0.5'.",
+            "Stop when half of a 95 % interval is this narrow: 0.02 (share of wins of each team), 'score[2]:0.5'. Or play only "
+            "the points whose interval is not yet: 'width(Guard.share) < 0.02'.",
+        ),
+    ] = None
+    target: Annotated[
+        str | None,
+        option(
+            "EXPR",
+            "Find the smallest value at which a mean reaches a target, and play only what that needs: 'Guard.share >= 0.95'. Up to "
+            "1,000 games of each point, or --runs.",
+        ),
+    ] = None
+    over: Annotated[
+        str | None,
+        option(
+            "NAME",
+            "The variable whose smallest value is searched; by default the first range, or choice of numbers.",
         ),
     ] = None
     directory: Annotated[
@@ -81,11 +97,14 @@ class BatchOptions(ManyGamesOptions):
         ),
     ] = None
     record_runs: Annotated[str | None, option("RUNS", "Record these runs in full: 417,3,10:20.")] = None
+    record_columns: Annotated[str | None, columns_option()] = None
     scheduler: Annotated[str | None, option("ADDRESS", "Play on a Dask cluster: tcp://HOST:8786.")] = None
     slurm: Annotated[str | None, option("N[,OPTION=VALUE...]", "Play in N Slurm jobs.")] = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        if self.record_columns is not None and self.record_runs is None:
+            raise typer.BadParameter("--record-columns is allowed with --record-runs only")
         if self.scheduler is None and self.slurm is None:
             return
         if self.processes is not None:
@@ -111,6 +130,14 @@ class OptimizeOptions(ManyGamesOptions):
             "Quantity whose mean over the games is maximized: 'score[3]-score[2]', 'wins[2]', 't'.",
         ),
     ] = ""
+    subject_to: Annotated[
+        list[str],
+        option(
+            "EXPR",
+            "Constraint that the mean over the games is to keep: 'lost[1] / start[1] < 0.2'. Can be repeated.",
+            "--subject-to",
+        ),
+    ] = field(default_factory=list)
     minimize: Annotated[bool, flag("--minimize", "Minimize the quantity instead.")] = False
     trials: Annotated[int, option("N", "Sets of values to try.", min=1, shows_default=True)] = 100
     runs: Annotated[
@@ -164,6 +191,21 @@ class AnalyzeOptions:
             "A B", "Compare, paired by seed, points with these numbers or values: tactic=keep tactic=switch."
         ),
     ] = None
+    target: Annotated[
+        str | None,
+        option(
+            "EXPR",
+            "Show from which value on a mean reaches a target, for each choice, and which further runs would narrow it: "
+            "'Guard.share >= 0.95'; by default the target of the command that played the batch.",
+        ),
+    ] = None
+    over: Annotated[
+        str | None,
+        option(
+            "NAME",
+            "The variable whose smallest value is searched; by default the first range, or choice of numbers.",
+        ),
+    ] = None
     by_point: Annotated[bool, flag("--by-point", "Show all points, not only twenty.")] = False
     as_json: Annotated[bool, flag("--json", "Print everything as JSON.")] = False
 
@@ -184,3 +226,17 @@ class ReportOptions:
             "--quantity",
         ),
     ] = field(default_factory=list)
+    target: Annotated[
+        str | None,
+        option(
+            "EXPR",
+            "Open with the answer to this question, as of tussle analyze; by default that of the command that played the batch.",
+        ),
+    ] = None
+    over: Annotated[
+        str | None,
+        option(
+            "NAME",
+            "The variable whose smallest value is searched; by default the first range, or choice of numbers.",
+        ),
+    ] = None

@@ -24,14 +24,17 @@ TIMES = {"start": "--from", "stop": "--to", "at": "--at"}
 
 def plot(options: PlotOptions) -> None:
     """Write the plots of a run, and print their names."""
-    from tussle.view.plots import Selection, write_plots
+    from tussle.view.plots import Selection, runs_of, write_plots
 
     start = -math.inf if options.start is None else read_time("--from", options.start)
     stop = math.inf if options.stop is None else read_time("--to", options.stop)
     selection = Selection(tuple(options.teams), tuple(options.entities), start, stop)
-    recording = Recording(options.run, options.world, tuple(options.plugin_files))
+    runs = [run for path in (options.run, *(options.others or ())) for run in runs_of(path)]
+    recording, *others = [Recording(run, options.world, tuple(options.plugin_files)) for run in runs]
     directory = options.directory or options.run / "plots"
-    written = write_plots(recording, directory, options.kinds, selection, options.between, options.form)
+    written = write_plots(
+        recording, directory, options.kinds, selection, options.between, options.form, options.columns, others
+    )
     for note in written.notes:
         say_note(note)
     for file in written.files:
@@ -166,7 +169,13 @@ class _Exporter:
 
         recording = self.recording
         with ProgressMeter("rosbag2", "states") as meter:
-            report = write_rosbag2(recording, files["rosbag2"], period=self._options.period, show=meter.show)
+            report = write_rosbag2(
+                recording,
+                files["rosbag2"],
+                period=self._options.period,
+                storage=self._options.storage or "mcap",
+                show=meter.show,
+            )
         for note in report.notes:
             say_note(note)
         _report(report.path, f"{report.n_frames:,} states, {report.n_messages:,} messages")

@@ -32,6 +32,7 @@ USED_BY = {
     "at": ("png",),
     "scale": (*IMAGES, "mcap"),
     "period": ("html", "mcap", "rosbag2"),
+    "storage": ("rosbag2",),
 }  # fmt: skip
 """Outputs that use an option."""
 SPECIAL_NAMES = {"start": "--from", "stop": "--to"}
@@ -98,6 +99,10 @@ class ExportOptions(PluginOptions):
         option("S", "Time between the states in --html, --mcap and --rosbag2 [s]; by default all states."),
     ] = None
 
+    storage: Annotated[str | None, option("mcap|sqlite3", "File format of --rosbag2; by default mcap.")] = (
+        None
+    )
+
     def __post_init__(self) -> None:
         if not self.files:
             raise typer.BadParameter(f"no output is given; possible outputs: {_listed(DEFAULT_NAMES, ', ')}")
@@ -124,9 +129,16 @@ def _listed(names: Iterable[str], separator: str) -> str:
 
 @dataclass(frozen=True, kw_only=True)
 class PlotOptions(PluginOptions):
-    """Plot a recorded run: trajectories, speed, altitude, entities left, captures, density."""
+    """Plot a recorded run: trajectories, speed, altitude, entities left, captures, density; columns also of several runs or a batch."""
 
-    run: Annotated[Path, argument("RUN", "A run directory, complete or not.")]
+    run: Annotated[
+        Path,
+        argument("RUN", "A run directory, complete or not; with --column also a batch with recorded runs."),
+    ]
+    others: Annotated[
+        list[Path] | None,
+        argument("[RUN]...", "Further runs or batches, whose columns are compared with the first."),
+    ] = None
     kinds: Annotated[
         list[str],
         option(
@@ -134,6 +146,15 @@ class PlotOptions(PluginOptions):
             "trajectory, trajectory3d, speed, altitude, left, captures, density or distance; by default all that have data. "
             "Can be repeated.",
             "--kind",
+        ),
+    ] = field(default_factory=list)
+    columns: Annotated[
+        list[str],
+        option(
+            "NAME",
+            "Plot this column over time: one of a plugin that was recorded, such as Boids.goal or Boids.goal.x, or x, y, z, vx, vy, vz, "
+            "qw, qx, qy, qz, health. Can be repeated.",
+            "--column",
         ),
     ] = field(default_factory=list)
     between: Annotated[

@@ -40,6 +40,7 @@ def optimize(options: OptimizeOptions) -> int:
         options.objective,
         vary=tuple(options.vary),
         minimize=options.minimize,
+        subject_to=tuple(options.subject_to),
         runs=options.runs,
         per_round=options.per_round,
         sampler=options.sampler,
@@ -159,14 +160,19 @@ def show_study(study: Study, optimization: Optimization, directory: Path, search
                 str(trial.number),
                 *study.settings(trial.values).values(),
                 estimate(trial.objective, trial.low, trial.high),
+                *(f"{mean:.4g}" for mean in study.constrained(trial).values()),
             ],
         )
         for place, trial in enumerate(study.ranking[:MOST_TRIALS])
     ]
+    quantities = [str(constraint.quantity) for constraint in study.constraints]
+    kept = "".join(f", subject to {constraint}" for constraint in study.constraints)
     put(
         "",
-        title(name, f"{info['direction']} {study.objective} · {n}{points} · {seeds} · {info['sampler']}"),
-        *number_tables(["trial", *short_names(study.variables), "objective"], rows),
+        title(
+            name, f"{info['direction']} {study.objective}{kept} · {n}{points} · {seeds} · {info['sampler']}"
+        ),
+        *number_tables(["trial", *short_names(study.variables), "objective", *quantities], rows),
         Text(" the best first; in parentheses: 95 % intervals", "dim italic"),
         fact_list(
             [
@@ -181,6 +187,14 @@ def show_study(study: Study, optimization: Optimization, directory: Path, search
         out().print(Text(f" {command}"), soft_wrap=True)  # on one line, so that it can be copied
     put("")
     failed = [t for t in study.trials if not t.is_complete]
+    if study.best is None and study.nearest is not None:
+        off = ", ".join(
+            f"{quantity} {mean:.4g}" for quantity, mean in study.constrained(study.nearest).items()
+        )
+        say_note(
+            f"no trial keeps the constraints; the nearest, {study.label(study.nearest.values)}, has {off}"
+        )
+        return OK
     if failed and study.best is None:
         say_error(f"all trials failed; the first: {failed[0].error}")
         return PLUGIN_FAILED

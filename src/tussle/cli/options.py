@@ -37,6 +37,14 @@ def option(metavar: str | None, text: str, *names: str, shows_default: bool = Fa
     return typer.Option(*names, metavar=metavar, help=text, show_default=shows_default, **more)
 
 
+def columns_option() -> Any:
+    """The option for columns of plugins that are recorded."""
+    return option(
+        "COLUMNS",
+        "Record these State and Output columns of plugins, too: prey.Boids.goal,'*.goal'; * is any characters.",
+    )
+
+
 def flag(name: str, text: str) -> Any:
     """An option without a value."""
     return typer.Option(name, help=text)

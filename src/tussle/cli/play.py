@@ -30,7 +30,8 @@ from tussle.displays import counted
 from tussle.engine.simulation import Simulation
 from tussle.errors import BatchError, MissionError, ParameterError, RecordError, TussleError, WiringError
 from tussle.mission import Loaded, Mission, to_python, to_xml
-from tussle.record.schema import RUN_FILE, TRAJECTORY_FILE
+from tussle.record.plugin_columns import select
+from tussle.record.schema import MISSION_FILE, RUN_FILE, TRAJECTORY_FILE
 
 if TYPE_CHECKING:
     from tussle.batch.reload import PlannedRun
@@ -63,17 +64,25 @@ def record(
     loaded: Loaded,
     period: float | None = None,
     shapes: bool = False,
+    columns: str | None = None,
+    results: bool = False,
 ) -> Recorder:
     """Return a recorder of a simulation.
 
     Raises:
         RecordError: The directory cannot be written.
+        ParameterError: A column does not exist.
     """
     from tussle.record import Recorder
 
+    if loaded.plugin_files:
+        from tussle.batch.trust import remember
+
+        remember(loaded.plugin_files)
     return Recorder(
         simulation, directory, period=period, mission_text=loaded.text, parameters=loaded.settings, shapes=shapes,
-        scene_files=loaded.scene_files, mission_notes=loaded.game_notes,
+        columns=columns or (), results=results, scene_files=loaded.scene_files, mission_notes=loaded.game_notes,
+        plugin_files=loaded.plugin_files,
     )  # fmt: skip
 
 
@@ -211,8 +220,19 @@ def run(options: RunOptions) -> int:
             interrupt = stack.enter_context(Interrupt())
             simulation.state.context.is_interrupted = lambda: bool(interrupt.code)
             if not options.no_log:
+                select(
+                    mission, options.record_columns or ""
+                )  # a wrong name is found before a directory is made
                 directory = options.directory or _new_directory(name, seed)
-                recorder = record(simulation, directory, loaded, options.log_period, options.shapes)
+                recorder = record(
+                    simulation,
+                    directory,
+                    loaded,
+                    options.log_period,
+                    options.shapes,
+                    options.record_columns,
+                    options.results,
+                )
             if recorder is not None:
                 stack.push(partial(_close_interrupted, recorder))
             simulation.step()  # loads or compiles kernels, so it counts as preparation
@@ -224,9 +244,9 @@ def run(options: RunOptions) -> int:
         show_summary(simulation, name, speed, recorder.directory if recorder else None)
         if planned is not None and simulation.is_over and options.start_from is None:
             check_hash(planned, simulation.state_hash(), str(options.from_batch))
-            known = "the end is that of the batch: the same state hash"
+            known = f"the end is that of the {planned.origin}: the same state hash"
             say_note(
-                f"run {options.from_batch}: {known if planned.state_hash else 'the batch has not played it yet'}"
+                f"run {options.from_batch}: {known if planned.state_hash else f'the {planned.origin} has not played it to its end'}"
             )
     if error is not None:
         raise error
@@ -296,18 +316,29 @@ def _new_directory(name: str, seed: int) -> Path:
 
 
 def planned_by(options: RunOptions) -> PlannedRun:
-    """Return the run of a batch that `--from DIR:417` names.
+    """Return the run of a batch that `--from DIR:417` names, or the run of a run directory.
 
     Raises:
         ParameterError: The text has another form.
         BatchError: The batch cannot be read, or its plugin code may not run.
     """
-    from tussle.batch.reload import planned_run
+    from tussle.batch.reload import planned_run, recorded_run
 
-    directory, colon, number = (options.from_batch or "").rpartition(":")
+    text = options.from_batch or ""
+    directory, colon, number = text.rpartition(":")
+    for run, world in ((text, "0"), (directory, number)):
+        if run and world.isdigit() and (Path(run) / MISSION_FILE).exists():
+            return recorded_run(
+                Path(run),
+                int(world),
+                may_run=lambda code: _may_run(code, options.trust),
+                allow_large=options.allow_large,
+                search=options.data_path,
+            )
     if not colon or not number.isdigit():
         raise ParameterError(
-            f"--from {options.from_batch!r} is not allowed; it takes a batch directory and the number of a run, DIR:417"
+            f"--from {options.from_batch!r} is not allowed; it takes a batch directory and the number of a run, "
+            "DIR:417, or a run directory"
         )
     return planned_run(
         Path(directory),
@@ -332,13 +363,14 @@ def _may_run(code: DirectoryCode, is_trusted: bool) -> bool:
 
 
 def check_hash(planned: PlannedRun, state_hash: str, name: str) -> None:
-    """Compare the end of a run with its end in the batch.
+    """Compare the end of a run with its end in the batch or recording.
 
     Raises:
         BatchError: The state hashes differ.
     """
     if planned.state_hash and state_hash != planned.state_hash:
         raise BatchError(
-            f"run {name} ended otherwise than in its batch: state hash {state_hash}, in the batch {planned.state_hash}; "
+            f"run {name} ended otherwise than in its {planned.origin}: state hash {state_hash}, in the {planned.origin} "
+            f"{planned.state_hash}; "
             "the version of tussle or of a plugin differs, or a plugin is not deterministic"
         )

@@ -15,6 +15,7 @@ from tussle.cli.options import (
     PluginOptions,
     argument,
     check_positive,
+    columns_option,
     flag,
     option,
 )
@@ -33,10 +34,14 @@ class RunOptions(MissionOptions):
         ),
     ] = ""
     from_batch: Annotated[
-        str | None, option("BATCH:RUN", "Play a run of a batch again instead of a mission.", "--from")
+        str | None,
+        option(
+            "BATCH:RUN", "Play a run of a batch, or a run directory, again instead of a mission.", "--from"
+        ),
     ] = None
     trust: Annotated[
-        bool, flag("--trust", "With --from: run the plugin code of a batch directory made by someone else.")
+        bool,
+        flag("--trust", "With --from: run the plugin code of a batch or run directory made by someone else."),
     ] = False
     directory: Annotated[
         Path | None, option("DIR", "Run directory; by default runs/NAME-SEED-TIMESTAMP.", "--out")
@@ -46,6 +51,10 @@ class RunOptions(MissionOptions):
         float | None, option("S", "Time between recorded states [s]; by default every step.")
     ] = None
     shapes: Annotated[bool, flag("--shapes", "Record the shapes that plugins draw, too.")] = False
+    record_columns: Annotated[str | None, columns_option()] = None
+    results: Annotated[
+        bool, flag("--results", "Record scores and results after each step, too, for curves in replays.")
+    ] = False
     pace: Annotated[
         float | None,
         option("X", "Play at most X times as fast as real time. The result does not change."),
@@ -56,9 +65,16 @@ class RunOptions(MissionOptions):
     ] = None
 
     def __post_init__(self) -> None:
-        if self.no_log and (self.directory is not None or self.log_period is not None or self.shapes):
+        recorded = (
+            self.directory,
+            self.log_period,
+            self.shapes or None,
+            self.record_columns,
+            self.results or None,
+        )
+        if self.no_log and recorded != (None,) * 5:
             raise typer.BadParameter(
-                "--no-log records nothing, so --out, --log-period and --shapes are not allowed with it"
+                "--no-log records nothing, so --out, --log-period, --shapes, --record-columns and --results are not allowed with it"
             )
         check_positive(pace=self.pace, log_period=self.log_period)
         is_changed = self.mission or self.more or self.settings or self.plugin_files
@@ -201,6 +217,7 @@ class ViewOptions(MissionOptions, PageOptions):
     record: Annotated[
         Path | None, option("DIR", "Record the game into this directory, as tussle run does.")
     ] = None
+    record_columns: Annotated[str | None, columns_option()] = None
     exit_when_over: Annotated[bool, flag("--exit-when-over", "End with the game, not only by Ctrl-C.")] = (
         False
     )
@@ -208,6 +225,8 @@ class ViewOptions(MissionOptions, PageOptions):
     def __post_init__(self) -> None:
         MissionOptions.__post_init__(self)
         PageOptions.__post_init__(self)
+        if self.record_columns is not None and self.record is None:
+            raise typer.BadParameter("--record-columns is allowed with --record only")
 
 
 @dataclass(frozen=True, kw_only=True)

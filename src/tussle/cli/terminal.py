@@ -88,15 +88,15 @@ def _console(stderr: bool) -> Console:
 
 
 def put(*parts: RenderableType) -> None:
-    """Print results. If the output is not a terminal, trailing spaces are removed."""
+    """Print results; a text that does not wrap stays on one line, to be copied. If the output is no terminal, without spaces at ends."""
     console = out()
     if console.is_terminal:
         for part in parts:
-            console.print(part)
+            console.print(part, soft_wrap=isinstance(part, Text) and bool(part.no_wrap))
         return
     with console.capture() as captured:
         for part in parts:
-            console.print(part)
+            console.print(part, soft_wrap=isinstance(part, Text) and bool(part.no_wrap))
     for line in captured.get().splitlines():
         console.print(line.rstrip(), soft_wrap=True)
 

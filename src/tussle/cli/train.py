@@ -29,7 +29,7 @@ def train(options: TrainOptions) -> int:
 
     for path in options.plugin_files:
         load_plugin_file(path)
-    task = registered_task(options.task, "the command line")
+    task = registered_task(options.task, "TASK")
     folder = options.directory or Path("training") / options.task.rpartition("/")[2]
     if (folder / "checkpoint.pt").exists() and not options.resume:
         raise ParameterError(f"{folder} has a checkpoint; continue it with --resume, or choose another --out")

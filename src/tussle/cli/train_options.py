@@ -66,7 +66,7 @@ class LeagueOptions(PluginOptions):
         str,
         option(
             "PLAYERS",
-            "Who plays, separated by commas: rules (the autonomies of the mission), ONNX files, and NAME=FILE.",
+            "Who plays, separated by commas: rules (the autonomies of the mission), ONNX files, NAME=FILE, and NAME=rules.",
         ),
     ]
     games: Annotated[

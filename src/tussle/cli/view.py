@@ -41,7 +41,16 @@ def view(options: ViewOptions) -> int:
         recorder = None
         if options.record is not None:
             # Closed last, however the game ends.
-            recorder = stack.enter_context(record(simulation, options.record, loaded, shapes=True))
+            recorder = stack.enter_context(
+                record(
+                    simulation,
+                    options.record,
+                    loaded,
+                    shapes=True,
+                    columns=options.record_columns,
+                    results=True,
+                )
+            )
         live = Live(
             simulation,
             pace=_pace_of(viewer) if options.pace is None else options.speed,

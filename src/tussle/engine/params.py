@@ -46,9 +46,9 @@ class Overrides:
                     row[w] = item
                 continue
             if key not in self.columns:
-                self.columns[key] = np.zeros((self.n_worlds, *column.shape))
+                self.columns[key] = np.zeros((self.n_worlds, *column.shape), column.dtype)
                 self.given[key] = np.zeros(self.n_worlds, bool)
-            self.columns[key][worlds] = np.asarray(items, float)
+            self.columns[key][worlds] = items
             self.given[key][worlds] = True
 
     def checked(self, values: Mapping[str, Any], n_worlds: int) -> dict[str, list[Any]]:
@@ -113,7 +113,7 @@ class Overrides:
 
     def fill(self, owner: str, path: tuple[str, ...], name: str, base: Any, world: np.ndarray) -> np.ndarray:
         """Values of a parameter for rows of the worlds `world`, (m,) or (k, m)."""
-        out = np.asarray(base, float)[..., None] + np.zeros(len(world))
+        out = np.repeat(np.asarray(base)[..., None], len(world), axis=-1)
         key = (owner, path, name)
         if key in self.columns:
             given = self.given[key][world]

@@ -35,6 +35,12 @@ def rows_changed(state: SimulationState) -> None:
     state.has_changed = True
 
 
+def place(state: SimulationState, rows: np.ndarray, **body: np.ndarray) -> None:
+    """Place entities, see `WorldView.move`, and let their motion models go on from there at once, at the beginning of a step."""
+    state.world_view.move(rows, **body)
+    apply_moves(state, 0.0)
+
+
 def apply_moves(state: SimulationState, phase: float = 1.0) -> None:
     """Let motion models set their states where world plugins have moved entities. Sensors update beliefs when next called."""
     view = state.world_view

@@ -7,6 +7,7 @@ import warnings
 import weakref
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
@@ -18,6 +19,7 @@ from tussle.engine import access
 from tussle.engine.arrivals import reset, spawn_due
 from tussle.engine.reseed import renew_keys
 from tussle.engine.result import WorldResult
+from tussle.engine.rows import place
 from tussle.engine.schedule import Call, compose
 from tussle.engine.snapshot import Snapshot, restore, snapshot, state_hash
 from tussle.engine.state import SimulationState
@@ -82,6 +84,7 @@ class Simulation:
         self._resumed.set()
         self.state = SimulationState(mission, numbers, params or {}, threads, on_error, start_from)
         self.state.context.simulation = weakref.ref(self)
+        self.state.context.move = partial(place, self.state)
         self.events = self.state.events
         self.events.on_change = self.state.population.on_new_group = self._forget_schedule
         try:
@@ -305,11 +308,15 @@ class Simulation:
         """
         restore(self.state, snapshot)
 
-    def result(self) -> list[WorldResult]:
-        """Result of each world; of running worlds, the result so far."""
+    def result(self, *, is_hashed: bool = True) -> list[WorldResult]:
+        """Result of each world; of running worlds, the result so far.
+
+        Args:
+            is_hashed: Also the state hash of running worlds, which takes longer than the rest.
+        """
         state = self.state
         return [
-            r if r is not None and not state.running[w] else world_result(state, w, "")
+            r if r is not None and not state.running[w] else world_result(state, w, "", is_hashed)
             for w, r in enumerate(state.results)
         ]
 

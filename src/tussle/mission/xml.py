@@ -59,6 +59,7 @@ class Loaded:
         files: All files that were read: the mission's and those it includes.
         scene_files: Files of surfaces and their textures, by their paths from the folder in which they were found.
         settings: Values set from outside, as texts of the file.
+        plugin_files: The Python files with plugins that it was read with.
     """
 
     mission: Mission
@@ -75,6 +76,7 @@ class Loaded:
     files: tuple[Path, ...] = ()
     scene_files: dict[str, Path] = field(default_factory=dict)
     settings: dict[str, str] = field(default_factory=dict)
+    plugin_files: tuple[PluginFile, ...] = ()
 
     @property
     def game_notes(self) -> tuple[str, ...]:
@@ -144,7 +146,8 @@ def _read(
         raise MissionError(
             f"{read.root.place}: the root tag is <{read.root.tag[:80]}>; it must be <runscript>"
         )
-    catalogue = _catalogue(read, compat, plugin_files)
+    files = tuple(f if isinstance(f, PluginFile) else PluginFile.of(f) for f in plugin_files)
+    catalogue = _catalogue(read, compat, files)
     problems.strictness = strictness_of(read.root, read.own_text, strict)
     report_stray(read.root, problems)
     expand_entity_common(read.root, problems, budget)
@@ -153,7 +156,7 @@ def _read(
     if paths:
         read.text = read.root.to_text()
     reader = _WorldReader(read, catalogue, problems, budget, [path.parent, *map(Path, search)])
-    return replace(reader.loaded(), settings=settings | paths)
+    return replace(reader.loaded(), settings=settings | paths, plugin_files=files)
 
 
 def _catalogue(read: MissionSource, compat: str | None, plugin_files: Sequence[Any]) -> Catalogue:

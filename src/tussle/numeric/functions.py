@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import functools
+import operator
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -73,3 +75,8 @@ exp = Elementwise(elementary.exp)
 log = Elementwise(elementary.log)
 wrap = Elementwise(elementary.wrap)
 atan2 = Elementwise(elementary.atan2, n_in=2)
+
+
+def total(values: Iterable[float]) -> float:
+    """Return the sum of values, added from left to right. Python's `sum` compensates for rounding since 3.12: it has other bits there."""
+    return functools.reduce(operator.add, values, 0.0)

@@ -22,10 +22,11 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from tussle.numeric import processor, store
+from tussle.numeric.device_compiler import device_compiler, set_environments
 from tussle.numeric.fingerprint import Fingerprint, package
 
 Code = str | tuple[str, ...]
-FORMAT = 2  # version of the file format, part of every key
+FORMAT = 3  # version of the file format, part of every key
 LETTERS = {"F": np.float64, "I": np.int64, "B": np.bool_, "U": np.uint64, "S": np.float32}
 NUMBERS: dict[str, tuple[type, ...]] = {
     "f8": (float, int, np.floating, np.integer),
@@ -188,6 +189,7 @@ class Device:
                 renamed(self.py_func, self._digest),
                 no_cpython_wrapper=True,
                 no_cfunc_wrapper=True,
+                pipeline_class=device_compiler(),
                 **self.options,
             )
         return self._dispatcher
@@ -390,7 +392,9 @@ class Kernel(Device):
         with compiling(), collecting_later():
             main.compile(self.types)
         stats.compiled += 1
-        return next(iter(main.overloads.values()))
+        result = next(iter(main.overloads.values()))
+        set_environments(result.library)
+        return result
 
     def _accept(self, *args: Any) -> Any:
         """Called by the dispatcher for new argument types: register them if they match the signature. Never compiles."""

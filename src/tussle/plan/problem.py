@@ -14,6 +14,8 @@ from tussle.errors import ParameterError, listed, nearest_name
 from tussle.scene import Scene
 
 POSITION = ("x", "y", "z")
+GOAL_TICKS = 11
+"""Places along a diameter of the goal at which obstacles are looked for; odd, so that its center is one."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +40,8 @@ class Problem:
         longest: Largest number of steps of a command.
 
     Raises:
-        ParameterError: A name is unknown, or a value is not allowed.
+        ParameterError: A name is unknown, or a value is not allowed: the start or the goal is not finite, outside the bounds, or in
+            an obstacle.
     """
 
     motion: MotionModel
@@ -63,6 +66,8 @@ class Problem:
         self.check_names("held", self.held, self.inputs)
         if not set(POSITION) <= set(self.fields):
             raise ParameterError(f"{name} has no state fields x, y, z; it has {', '.join(self.fields)}")
+        if not self.commands:
+            raise ParameterError(f"commands is empty; it takes one or more of {', '.join(self.inputs)}")
         for owner, ranges in (("bounds", self.bounds), ("commands", self.commands)):
             for key, (low, high) in ranges.items():
                 if not (np.isfinite([low, high]).all() and low <= high):
@@ -77,8 +82,48 @@ class Problem:
             raise ParameterError("goal_radius and dt must be > 0, and radius >= 0")
         if not 1 <= self.shortest <= self.longest or self.substeps < 1:
             raise ParameterError("1 <= shortest <= longest and substeps >= 1 are required")
+        self._check_start()
+        self._check_goal()
+
+    def _check_start(self) -> None:
+        """Raise a `ParameterError` if no plan can begin at the start."""
+        for name, value in zip(self.fields, self.first.tolist(), strict=True):
+            low, high = self.bounds.get(name, (-np.inf, np.inf))
+            if not np.isfinite(value):
+                raise ParameterError(f"start: {name} = {value} is not finite")
+            if not low <= value <= high:
+                raise ParameterError(f"start: {name} = {value:g} is outside the bounds, {low:g} to {high:g}")
         if not self.is_allowed(self.first[:, None])[0]:
-            raise ParameterError("the start is outside the bounds, or touches an obstacle")
+            raise ParameterError(
+                f"the start, {self._shown(self.first[self.position])}, is in an obstacle or less than radius = {self.radius:g} m from one"
+            )
+
+    def _check_goal(self) -> None:
+        """Raise a `ParameterError` if no plan can end in the goal."""
+        goal = np.array(self.goal, float)
+        ranges = np.array([self.bounds.get(name, (-np.inf, np.inf)) for name in POSITION])
+        gap = goal - np.clip(goal, *ranges.T)
+        if np.sqrt(gap @ gap) > self.goal_radius:
+            name = POSITION[int(np.abs(gap).argmax())]
+            low, high = self.bounds[name]
+            raise ParameterError(
+                f"the goal cannot be reached: {name} = {goal[POSITION.index(name)]:g} is outside the bounds, {low:g} to {high:g}, by more "
+                f"than goal_radius = {self.goal_radius:g} m"
+            )
+        if self.scene.solids:
+            ticks = np.linspace(-1.0, 1.0, GOAL_TICKS)
+            grid = np.stack(np.meshgrid(ticks, ticks, ticks)).reshape(3, -1)
+            places = goal[:, None] + self.goal_radius * grid[:, (grid * grid).sum(axis=0) <= 1.0]
+            places = np.clip(places, ranges[:, :1], ranges[:, 1:])
+            if not self.scene.free(np.ascontiguousarray(places), self.radius).any():
+                raise ParameterError(
+                    f"the goal cannot be reached: all places within goal_radius = {self.goal_radius:g} m of {self._shown(goal)} are in an "
+                    f"obstacle or less than radius = {self.radius:g} m from one"
+                )
+
+    @staticmethod
+    def _shown(place: np.ndarray) -> str:
+        return f"({', '.join(f'{x:g}' for x in place.tolist())})"
 
     def check_names(self, what: str, given: Mapping[str, Any], allowed: Sequence[str]) -> None:
         """Raise a `ParameterError` for a name that is not allowed in the argument `what`."""
@@ -142,6 +187,25 @@ class Problem:
             allowed[some] = self.scene.free_between(a, b, self.radius)
         return allowed
 
+    @property
+    def is_at_goal(self) -> bool:
+        """Whether the start is in the goal, so that nothing is to be planned."""
+        return bool(self.distance(self.first) <= self.goal_radius)
+
+    def empty_plan(self) -> Plan:
+        """The plan to stay at the start."""
+        place = self.first[self.position]
+        return Plan(
+            problem=self,
+            is_solved=True,
+            commands=np.zeros((0, len(self.commands))),
+            steps=np.zeros(0, np.int64),
+            nodes=place[:, None],
+            parents=np.full(1, -1),
+            costs=np.zeros(1),
+            n_propagated=0,
+        )
+
     def distance(self, x: np.ndarray) -> np.ndarray:
         """Distance of states (m, ...) to the goal [m], (...)."""
         goal = np.reshape(self.goal, (3,) + (1,) * (x.ndim - 1))
@@ -177,6 +241,11 @@ class Plan:
     def cost(self) -> float:
         """Duration [s]."""
         return float(self.problem.dt * self.steps.sum())
+
+    @property
+    def distance_left(self) -> float:
+        """Distance from its end to the center of the goal [m]."""
+        return float(self.problem.distance(self.path[-1]))
 
     @cached_property
     def inputs(self) -> np.ndarray:

@@ -108,15 +108,19 @@ def solve(
         stop_at_first: Return the first plan that reaches the goal.
 
     Returns:
-        The fastest plan. If `is_solved` is false, the goal was not reached, and the plan ends nearest to it.
+        The fastest plan, without commands if the start is in the goal. If `is_solved` is false, the goal was not reached, and the plan ends
+        nearest to it, at `distance_left`.
 
     Raises:
         ParameterError: A value is not allowed.
     """
     if branches < 1 or batch < COMMANDS_PER_NODE:
         raise ParameterError(f"branches >= 1 and batch >= {COMMANDS_PER_NODE} are required")
+    sizes = _cell_sizes(problem, cells or {})
+    if problem.is_at_goal:
+        return problem.empty_plan()
     chance = np.random.default_rng(seed)
-    tree = Tree(problem, _cell_sizes(problem, cells or {}), branches + batch + 1)
+    tree = Tree(problem, sizes, branches + batch + 1)
     none, first = np.zeros((len(problem.commands), 1)), problem.first[:, None]
     tree.add(first, np.zeros(1), np.full(1, -1), none, np.zeros(1, np.int64), np.ones(1, bool))
     best, least, n_propagated = 0, np.inf, 0

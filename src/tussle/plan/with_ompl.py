@@ -10,9 +10,10 @@ from tussle.errors import MissingExtraError, ParameterError, listed, nearest_nam
 from tussle.plan.problem import Plan, Problem
 
 PLANNERS = ("RRT", "KPIECE1", "EST")
+"""OMPL's SST and PDST cannot be made in Python, as of 2.0.1: their bindings have no constructors."""
 
 
-def solve_with_ompl(problem: Problem, planner: str = "RRT", *, seed: int = 1, seconds: float = 5.0) -> Plan:
+def solve_with_ompl(problem: Problem, planner: str = "RRT", *, seed: int = 1, seconds: float = 60.0) -> Plan:
     """Search a way to the goal with a planner of OMPL (Sucan, Moll and Kavraki 2012, IEEE Robotics and Automation Magazine 19).
 
     OMPL's states are those of the motion model; it samples the bounded fields. It calls Python for every step, and stops at the
@@ -24,6 +25,9 @@ def solve_with_ompl(problem: Problem, planner: str = "RRT", *, seed: int = 1, se
         planner: "RRT", "KPIECE1" or "EST".
         seed: Seed of OMPL's random numbers, > 0.
         seconds: Limit of the computing time [s].
+
+    Returns:
+        The first plan. If `is_solved` is false, the time was over, and `distance_left` tells how far its end is from the goal.
 
     Raises:
         MissingExtraError: OMPL is not installed.
@@ -37,6 +41,8 @@ def solve_with_ompl(problem: Problem, planner: str = "RRT", *, seed: int = 1, se
         raise ParameterError(
             f"planner = {planner!r} is not allowed{nearest_name(planner, PLANNERS)}; {listed(PLANNERS)}"
         )
+    if problem.is_at_goal:
+        return problem.empty_plan()
     util.setLogLevel(util.LogLevel.LOG_NONE)
     util.RNG.setSeed(seed)
     calls = _Calls(problem)

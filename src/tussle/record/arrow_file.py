@@ -11,6 +11,7 @@ import pyarrow.compute as pc
 from tussle.displays import counted
 from tussle.errors import TussleError
 from tussle.record.arrow_blocks import SCHEMA, InvalidStreamError, StreamBlocks, find_blocks
+from tussle.record.plugin_columns import is_of_plugin
 from tussle.record.table_values import Rules, check_values
 
 MAX_CHECKED_MAPPED = 1 << 28
@@ -35,7 +36,7 @@ def read_batches(
         path: The file.
         notes: Receives a line for each part that is missing.
         error: Class of the errors that are raised.
-        schema: Required columns; None for any.
+        schema: Required columns, behind which columns of plugins may follow; None for any.
         rules: Allowed values by column.
         is_mapped: Leave the rows in the file, which is mapped into memory, and check no values.
         damage: Receives a line if blocks are damaged; None if that is an error.
@@ -58,7 +59,13 @@ def read_batches(
             notes.append(f"{path.name} is truncated before its first batch")
             return
         for found in _batches(path, blocks, schema, is_mapped):
-            batch = found if schema is None else pa.RecordBatch.from_arrays(found.columns, schema=schema)
+            batch = (
+                found
+                if schema is None
+                else pa.RecordBatch.from_arrays(
+                    found.columns, schema=with_plugin_columns(found.schema, schema)
+                )
+            )
             batch.validate(full=not is_mapped)
             _check_columns(batch)
             if not is_mapped:
@@ -135,9 +142,16 @@ def same_columns(found: pa.Schema, wanted: pa.Schema) -> str:
     return f"it has no column {wrong[0].name!r} of {wrong[0].type}" if wrong else ""
 
 
+def with_plugin_columns(found: pa.Schema, wanted: pa.Schema) -> pa.Schema:
+    """The required columns, and the columns of plugins that a table has behind them."""
+    return pa.schema([*wanted, *(part for part in list(found)[len(wanted) :] if is_of_plugin(part))])
+
+
 def _check_schema(found: pa.Schema, wanted: pa.Schema) -> None:
     difference = same_columns(found, wanted)
-    if not difference and found.names != wanted.names:
+    if not difference and (
+        len({*found.names}) < len(found) or found.names != with_plugin_columns(found, wanted).names
+    ):
         difference = "it has other columns than a table of tussle"
     if difference:
         raise InvalidStreamError(difference)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import shutil
 import time
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from fractions import Fraction
 from pathlib import Path
 from typing import Any, Protocol, Self
@@ -14,9 +14,12 @@ import numpy as np
 import pyarrow as pa
 
 from tussle.errors import MissionError, ParameterError, RecordError
-from tussle.mission import to_xml
+from tussle.mission import PluginFile, to_xml
 from tussle.record import run_file
 from tussle.record.events import BIRTH, END, Events
+from tussle.record.plugin_columns import ColumnReader, select
+from tussle.record.plugin_copies import plugin_copies
+from tussle.record.results import ResultRows
 from tussle.record.row_buffer import RowBuffer, RowSelection
 from tussle.record.schema import (
     EVENTS,
@@ -25,15 +28,18 @@ from tussle.record.schema import (
     LINKS,
     LINKS_FILE,
     MISSION_FILE,
+    RESULTS,
+    RESULTS_FILE,
     SHAPES,
     SHAPES_FILE,
-    TRAJECTORY,
     TRAJECTORY_FILE,
 )
 from tussle.record.shapes import ShapeRows
 from tussle.record.stream import Stream
 from tussle.record.traffic import Traffic, check_file_names
 
+MOST_RESULTS = 100_000
+"""Changes of results that are collected between two flushes."""
 MOST_LETTERS = 4_000_000
 """Characters of shapes that are collected between two flushes."""
 
@@ -50,7 +56,7 @@ class Recorded(Protocol):
     @property
     def grade(self) -> str: ...
 
-    def result(self) -> list[Any]: ...
+    def result(self, *, is_hashed: bool = True) -> list[Any]: ...
 
 
 class Recorder:
@@ -69,12 +75,18 @@ class Recorder:
         mission_notes: Notes about the mission file, for `run.json`, see `tussle.mission.Loaded`.
         flush_every: Wall time between flushes [s].
         shapes: Whether the shapes that plugins draw are recorded, too; of every step, whatever the period.
+        columns: `State` and `Output` columns of plugins that are recorded with the states: "prey.Boids.goal", or "Boids.goal" for all
+            blocks; `*` stands for any characters, and a text may name several, separated by commas. Columns that are declared with
+            `recorded=True` are always recorded.
+        results: Whether scores and results of metrics, interactions and networks are recorded after each step, whatever the period.
         scene_files: Files of terrain, meshes and textures that the mission's text names, which are copied, by name: see
             `tussle.mission.Loaded`.
+        plugin_files: Python files with the mission's plugins, which are copied: see `tussle.mission.Loaded`.
 
     Raises:
         RecordError: The directory holds a run, or cannot be written.
-        ParameterError: `period` or `flush_every` is not positive and finite, or a network's `csv_filename` is no plain file name.
+        ParameterError: `period` or `flush_every` is not positive and finite, a network's `csv_filename` is no plain file name, or one of
+            `columns` does not exist.
     """
 
     def __init__(
@@ -88,7 +100,10 @@ class Recorder:
         mission_notes: Sequence[str] = (),
         flush_every: float = 1.0,
         shapes: bool = False,
+        columns: str | Iterable[str] = (),
+        results: bool = False,
         scene_files: Mapping[str, Path] | None = None,
+        plugin_files: Sequence[PluginFile] = (),
     ) -> None:
         for name, value in (("period", period), ("flush_every", flush_every)):
             if value is not None and not 0.0 < value < float("inf"):
@@ -105,18 +120,28 @@ class Recorder:
         # A step times the numerator or denominator must fit into 64 bits.
         least = Fraction(1, 10**9)
         self._per_step = None if per_step >= 1 else max(Fraction(per_step).limit_denominator(10**9), least)
-        self._buffer = RowBuffer([b.name for b in mission.blocks], clock.start, clock.dt)
+        self.columns = columns if isinstance(columns, str) else ",".join(columns)
+        self._columns = ColumnReader(sim, select(mission, self.columns))
+        recorded = [source.column for source in self._columns.sources]
+        self._buffer = RowBuffer([b.name for b in mission.blocks], clock.start, clock.dt, recorded)
         self._events: list[Events] = []
         self._rows_source: np.ndarray | None = None
         self._rows: RowSelection
         self._common_step = -1
         self._steps = np.full(sim.n_worlds, -1, np.int64)
         self._others: list[str] = []
-        self._open(mission_text, shapes, scene_files or {})
+        self._open(mission_text, shapes, results, scene_files or {}, plugin_files)
         self._flush_at = time.monotonic() + flush_every
         self._begin()
 
-    def _open(self, mission_text: str | None, shapes: bool, scene_files: Mapping[str, Path]) -> None:
+    def _open(
+        self,
+        mission_text: str | None,
+        shapes: bool,
+        results: bool,
+        scene_files: Mapping[str, Path],
+        plugin_files: Sequence[PluginFile],
+    ) -> None:
         try:
             self.directory.mkdir(parents=True, exist_ok=True)
             held = [name for name in FILES if (self.directory / name).exists()]
@@ -134,11 +159,15 @@ class Recorder:
                     place.parent.mkdir(parents=True, exist_ok=True)
                     shutil.copyfile(file, place)
                     self._others.append(name)
+            for name, text in plugin_copies(plugin_files).items():
+                (self.directory / name).parent.mkdir(parents=True, exist_ok=True)
+                (self.directory / name).write_text(text, encoding="utf-8")
+                self._others.append(name)
         except OSError as error:
             raise RecordError(
                 f"{self.directory}: cannot record a run there: {error.strerror or error}"
             ) from error
-        self._trajectory = Stream(self.directory / TRAJECTORY_FILE, TRAJECTORY)
+        self._trajectory = Stream(self.directory / TRAJECTORY_FILE, self._buffer.schema)
         self._event_stream = Stream(self.directory / EVENTS_FILE, EVENTS)
         self._streams = [self._trajectory, self._event_stream]
         self._shapes: ShapeRows | None = None
@@ -148,6 +177,10 @@ class Recorder:
                 Stream(self.directory / SHAPES_FILE, SHAPES),
             )
             self._streams.append(self._shape_stream)
+        self._results = ResultRows(self.sim) if results else None
+        if results:
+            self._result_stream = Stream(self.directory / RESULTS_FILE, RESULTS)
+            self._streams.append(self._result_stream)
         self._traffic = Traffic(self.sim.mission.networks, self.directory, self.sim.n_worlds)
 
     def _written_back(self) -> str:
@@ -177,6 +210,8 @@ class Recorder:
 
     def _observe(self, sim: Recorded) -> None:
         """Record the states at the beginning of a step, if it is due."""
+        if self._results:
+            self._results.read()
         clock = sim.state.context.clock
         step = clock.common
         if step < 0:
@@ -194,8 +229,10 @@ class Recorder:
                 bodies = sim.state.population.bodies
                 if bodies.ints is not self._rows_source:
                     self._rows_source, self._rows = bodies.ints, RowSelection(bodies.ints)
-                self._add(bodies.floats, self._rows, step)
-        if time.monotonic() >= self._flush_at or (self._shapes and self._shapes.n_letters > MOST_LETTERS):
+                self._add(self._rows, step)
+        n_letters = self._shapes.n_letters if self._shapes else 0
+        n_results = self._results.n if self._results else 0
+        if time.monotonic() >= self._flush_at or n_letters > MOST_LETTERS or n_results > MOST_RESULTS:
             self.flush()
 
     def _observe_apart(self, sim: Recorded) -> None:
@@ -209,9 +246,8 @@ class Recorder:
         if self._per_step is not None:
             p, q = self._per_step.numerator, self._per_step.denominator
             due &= (step * p) // q != ((step - 1) * p) // q
-        bodies = sim.state.population.bodies
-        rows = RowSelection(bodies.ints, due)
-        self._add(bodies.floats, rows, step[rows.world])
+        rows = RowSelection(sim.state.population.bodies.ints, due)
+        self._add(rows, step[rows.world])
 
     def _refuse_past(self) -> None:
         self.close("a world was reset or restored to an earlier step during the recording")
@@ -220,18 +256,22 @@ class Recorder:
             "close the recorder before `reset` or `restore`, and make another"
         )
 
-    def _add(self, floats: np.ndarray, rows: RowSelection, step: Any) -> None:
+    def _add(self, rows: RowSelection, step: Any, parked: Any = None) -> None:
+        """Record rows of the body table, or of that of a world that has ended."""
         if not self._buffer.has_room(rows.n):
             self._write(self._trajectory, self._buffer.take())
-        self._buffer.add(floats, rows, step)
+        bodies = self.sim.state.population.bodies if parked is None else parked.bodies
+        self._buffer.add(
+            bodies.floats, rows, step, self._columns.read(parked) if self._columns.sources else ()
+        )
 
     def _on_events(self, events: Events) -> None:
         """Keep events; at the end of a world, also record its last state."""
         self._events.append(events)
         if events.kind == END:
             for world, step in zip(events.world, events.step, strict=True):
-                bodies = self.sim.state.parked[int(world)].bodies
-                self._add(bodies.floats, RowSelection(bodies.ints), int(step))
+                parked = self.sim.state.parked[int(world)]
+                self._add(RowSelection(parked.bodies.ints), int(step), parked)
 
     def _write(self, stream: Stream, batch: pa.RecordBatch) -> None:
         try:
@@ -251,6 +291,8 @@ class Recorder:
             self._write(self._trajectory, self._buffer.take())
         if self._shapes and (drawn := self._shapes.take()):
             self._write(self._shape_stream, drawn)
+        if self._results and (changes := self._results.take()):
+            self._write(self._result_stream, changes)
         self._flush_at = time.monotonic() + self.flush_every
 
     def _take_events(self) -> pa.RecordBatch:
@@ -285,16 +327,18 @@ class Recorder:
         self.is_closed = True
         self._detach()
         sim, step = self.sim, self.sim.state.context.clock.step
+        if self._results:
+            self._results.read()
         last = np.maximum(self._steps, self._common_step)
         unrecorded = sim.state.running & (step > last)
         if unrecorded.any():
             rows = RowSelection(sim.state.population.bodies.ints, unrecorded)
-            self._add(sim.state.population.bodies.floats, rows, step[rows.world])
+            self._add(rows, step[rows.world])
         self.flush()
         if self._traffic.has_links:
             self._streams.append(Stream(self.directory / LINKS_FILE, LINKS))
             self._write(self._streams[-1], self._traffic.take_links())
-        for text in self._traffic.unknown_topics(sim.state.message_bus.topics):
+        for text in [*self._traffic.unknown_topics(sim.state.message_bus.topics), *self._columns.left_out()]:
             warnings.warn(text, RuntimeWarning, stacklevel=2)
         for stream in self._streams:
             stream.close()
@@ -308,6 +352,7 @@ class Recorder:
                 "period": self.period,
                 "parameters": self.parameters,
                 "mission_notes": self.mission_notes,
+                "columns": self.columns,
                 "interrupted": interrupted,
             },
         )

@@ -8,6 +8,7 @@ import numpy as np
 import pyarrow as pa
 
 from tussle.api.bodies import FLOATS, STORED_INTS
+from tussle.record.plugin_columns import PluginColumn, Values
 from tussle.record.schema import FLOAT_COLUMNS, INT_COLUMNS, TRAJECTORY
 
 CAPACITY = 32_768
@@ -51,11 +52,23 @@ class RowBuffer:
         blocks: Names of the blocks, by number.
         start: Time of step 0 [s].
         dt: Length of a step [s].
+        columns: Columns of plugins.
         capacity: Rows in a batch.
+
+    Attributes:
+        schema: Columns of the batches.
     """
 
-    def __init__(self, blocks: Sequence[str], start: float, dt: float, capacity: int = CAPACITY) -> None:
-        self.start, self.dt = start, dt
+    def __init__(
+        self,
+        blocks: Sequence[str],
+        start: float,
+        dt: float,
+        columns: Sequence[PluginColumn] = (),
+        capacity: int = CAPACITY,
+    ) -> None:
+        self.start, self.dt, self._columns = start, dt, columns
+        self.schema = pa.schema([*TRAJECTORY, *(part for column in columns for part in column.schema())])
         self._blocks = pa.array(blocks, pa.string())
         self._allocate(capacity)
 
@@ -64,17 +77,23 @@ class RowBuffer:
         self._floats = np.empty((len(FLOAT_COLUMNS), capacity))
         self._ints = np.empty((len(INT_COLUMNS), capacity), np.int32)
         self._step = np.empty(capacity, np.int32)
+        self._values: list[Values] = [
+            (np.empty((len(c.parts), capacity), c.dtype), np.empty(capacity, bool)) for c in self._columns
+        ]
 
     def has_room(self, n: int) -> bool:
         return self.n + n <= self.capacity
 
-    def add(self, floats: np.ndarray, rows: RowSelection, step: int | np.ndarray) -> None:
+    def add(
+        self, floats: np.ndarray, rows: RowSelection, step: int | np.ndarray, values: Sequence[Values] = ()
+    ) -> None:
         """Copy rows of a body table. The buffer must be empty or have room.
 
         Args:
             floats: Float columns of the table, (22, n).
             rows: Rows to copy.
             step: Step of all rows, or of each row, (m,).
+            values: Of the columns of plugins, for all rows of the table.
         """
         if not self.has_room(rows.n):
             assert self.n == 0
@@ -89,6 +108,9 @@ class RowBuffer:
             out[_N_STATE] = floats[_FIRST["health"]].take(rows.order)
         self._ints[:, first:last] = rows.columns
         self._step[first:last] = step
+        for own, new in zip(self._values, values, strict=True):
+            for stored, found in zip(own, new, strict=True):
+                stored[..., first:last] = found if rows.order is None else found.take(rows.order, axis=-1)
         self.n = last
 
     def take(self) -> pa.RecordBatch:
@@ -101,4 +123,8 @@ class RowBuffer:
         columns |= {"step": step, "t": self.start + step.astype(np.int64) * self.dt}  # as in the clock
         arrays = {name: pa.array(column) for name, column in columns.items()}
         arrays["block"] = pa.DictionaryArray.from_arrays(arrays["block"], self._blocks)
-        return pa.RecordBatch.from_arrays([arrays[name] for name in TRAJECTORY.names], schema=TRAJECTORY)
+        for column, (values, has_value) in zip(self._columns, self._values, strict=True):
+            mask = None if has_value[:n].all() else ~has_value[:n]
+            parts = (pa.array(part[:n], mask=mask) for part in values)
+            arrays |= dict(zip(column.parts, parts, strict=True))
+        return pa.RecordBatch.from_arrays([arrays[name] for name in self.schema.names], schema=self.schema)

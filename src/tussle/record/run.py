@@ -17,6 +17,7 @@ from tussle.documents import DAMAGED, MOST_BYTES, read_text
 from tussle.errors import MissingExtraError, ParameterError, RecordError, listed, nearest_name
 from tussle.mission.limits import Limits
 from tussle.record.arrow_file import read_batches
+from tussle.record.plugin_columns import PluginColumn, plugin_columns
 from tussle.record.run_file import crc_of_file
 from tussle.record.schema import (
     EVENTS,
@@ -27,6 +28,9 @@ from tussle.record.schema import (
     LINKS_FILE,
     LINKS_RULES,
     MISSION_FILE,
+    RESULTS,
+    RESULTS_FILE,
+    RESULTS_RULES,
     RUN,
     RUN_FILE,
     SHAPES,
@@ -74,6 +78,7 @@ class Run:
         self.trajectory_table = self._read_table(TRAJECTORY_FILE, TRAJECTORY, TRAJECTORY_RULES, is_mapped)
         self.events_table = self._read_table(EVENTS_FILE, EVENTS, EVENTS_RULES, False)
         self.shapes_table = self._read_if_written(SHAPES_FILE, SHAPES, SHAPES_RULES, is_mapped)
+        self.results_table = self._read_if_written(RESULTS_FILE, RESULTS, RESULTS_RULES, False)
         self.links_table = self._read_if_written(LINKS_FILE, LINKS, LINKS_RULES, False)
 
     def _read_if_written(self, name: str, schema: pa.Schema, rules: Rules, is_mapped: bool) -> pa.Table:
@@ -103,7 +108,8 @@ class Run:
     def _read_table(self, name: str, schema: pa.Schema, rules: Rules, is_mapped: bool) -> pa.Table:
         path, notes = self.path / name, list[str]()
         batches = read_batches(path, notes, RecordError, schema, rules, is_mapped=is_mapped, damage=notes)
-        table = pa.Table.from_batches(batches, schema)
+        complete = list(batches)
+        table = pa.Table.from_batches(complete, complete[0].schema if complete else schema)
         written = self.info.get("files", {}).get(name)
         if not notes and written is not None:
             found = {"bytes": path.stat().st_size, "rows": table.num_rows}
@@ -127,13 +133,23 @@ class Run:
 
     @cached_property
     def trajectory(self) -> Any:
-        """States: one row per entity and recorded step, as a frame."""
-        return self._frame(self.trajectory_table)
+        """States: one row per entity and recorded step, as a frame. Whole numbers and truths of plugins have types that can be missing."""
+        return frame_of(self.trajectory_table, self._frames, can_miss=True)
+
+    @cached_property
+    def columns(self) -> dict[str, PluginColumn]:
+        """Columns of plugins that were recorded with the states, by name."""
+        return plugin_columns(self.trajectory_table.schema)
 
     @cached_property
     def events(self) -> Any:
         """Births, deaths, captures, collisions and ends, as a frame."""
         return self._frame(self.events_table)
+
+    @cached_property
+    def results(self) -> Any:
+        """Scores and results, one row for each change, as a frame; empty unless they were recorded."""
+        return self._frame(self.results_table)
 
     @cached_property
     def links(self) -> Any:
@@ -235,8 +251,14 @@ def check_frames(package: str) -> None:
         )
 
 
-def frame_of(table: pa.Table, package: str) -> Any:
+def frame_of(table: pa.Table, package: str, *, can_miss: bool = False) -> Any:
     """A table as a frame of a package that `check_frames` allows.
+
+    Args:
+        table: The table.
+        package: The package; "" is the first of them that is installed.
+        can_miss: Whether columns of 64-bit integers and of truths get pandas' types with missing values; otherwise such columns become
+            real numbers, or objects, if values are missing.
 
     Raises:
         MissingExtraError: The package is not installed.
@@ -247,7 +269,11 @@ def frame_of(table: pa.Table, package: str) -> Any:
             f"frames need {name or 'pandas or polars'}, which is not installed: pip install 'tussle[frames]' installs pandas; "
             "Arrow tables need neither"
         )
-    return table.to_pandas() if name == "pandas" else import_module(name).from_arrow(table)
+    if name != "pandas":
+        return import_module(name).from_arrow(table)
+    pandas = import_module(name)
+    types = {pa.int64(): pandas.Int64Dtype(), pa.bool_(): pandas.BooleanDtype()} if can_miss else {}
+    return table.to_pandas(types_mapper=types.get)
 
 
 def run_directory(path: str | Path) -> Path:

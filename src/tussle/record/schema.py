@@ -14,11 +14,21 @@ FORMAT = 1
 TRAJECTORY_FILE = "trajectory.arrow"
 EVENTS_FILE = "events.arrow"
 SHAPES_FILE = "shapes.arrow"
+RESULTS_FILE = "results.arrow"
 LINKS_FILE = "links.arrow"
 SUMMARY_FILE = "summary.csv"
 MISSION_FILE = "mission.xml"
 RUN_FILE = "run.json"
-FILES = (TRAJECTORY_FILE, EVENTS_FILE, SHAPES_FILE, LINKS_FILE, SUMMARY_FILE, MISSION_FILE, RUN_FILE)
+FILES = (
+    TRAJECTORY_FILE,
+    EVENTS_FILE,
+    SHAPES_FILE,
+    RESULTS_FILE,
+    LINKS_FILE,
+    SUMMARY_FILE,
+    MISSION_FILE,
+    RUN_FILE,
+)
 
 FLOAT_COLUMNS = ("x", "y", "z", "vx", "vy", "vz", "qw", "qx", "qy", "qz", "health")
 """Float columns in the order of the body table."""
@@ -82,6 +92,20 @@ SHAPES = pa.schema(
 )
 """One row per shape that plugins drew, in the order of drawing."""
 
+RESULTS = pa.schema(
+    [
+        _field("world", _I, "number of the world in its stack"),
+        _field("t", _F, "time from which on it holds [s]"),
+        _field("step", _I, "number of the step that begins then"),
+        _field(
+            "name", pa.string(), "score, or plugin and result, such as SimpleCaptureMetrics.NonTeamCapture"
+        ),
+        pa.field("team", _I, metadata={"doc": "team; null where it is of none"}),
+        _field("value", _F, "its value until the next change"),
+    ]
+)
+"""One row per change of a score or a result, ordered by step and world."""
+
 LINKS = pa.schema(
     [
         _field("world", _I, "number of the world in its stack"),
@@ -102,6 +126,7 @@ EVENTS_RULES: Rules = {"world": COUNT, "t": NUMBER, "step": COUNT, "kind": TEXT,
 SHAPES_RULES: Rules = {
     "world": COUNT, "t": NUMBER, "step": COUNT, "kind": TEXT, "lifetime": Bounds(0.0), "attributes": TEXT,
 }  # fmt: skip
+RESULTS_RULES: Rules = {"world": COUNT, "t": NUMBER, "step": COUNT, "name": TEXT}
 
 LINKS_RULES: Rules = {
     "world": COUNT, "network": TEXT, "sender": COUNT, "receiver": COUNT, "outcome": TEXT, "messages": COUNT,

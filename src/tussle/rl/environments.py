@@ -62,6 +62,26 @@ def reset_one(swarm: Swarm, seed: Any, options: Any) -> None:
     swarm.reset(seed, None, options.get("params"))
 
 
+def told_of_one(swarm: Swarm) -> dict[str, Any]:
+    """Parameters that were given or drawn for the episode of a swarm of one world, as an info; empty without any."""
+    values = {path: value[0] for path, value in swarm.params.items() if not path.startswith("_")}
+    return {"params": {path: value.item() if value.ndim == 0 else value.copy() for path, value in values.items()}} if values else {}
+
+
+def _of_worlds(alive: np.ndarray, seeds: np.ndarray, params: dict[str, Any], worlds: np.ndarray) -> dict[str, Any]:
+    """Infos of some worlds, (W,); those of the others are zeros."""
+    info: dict[str, Any] = {"alive": alive & worlds[:, None], "seed": np.where(worlds, seeds, 0), "params": {}}
+    for path, values in params.items():
+        if not path.startswith("_"):
+            have = params[f"_{path}"] & worlds
+            told = values.copy()
+            told[~have] = values.dtype.type()
+            info["params"] |= {path: told, f"_{path}": have}
+    if not info["params"]:
+        del info["params"]
+    return {**info, **{f"_{name}": worlds.copy() for name in info}}
+
+
 class Pictures:
     """Shows world 0 of a swarm: as pictures, or in a browser while it plays. Starts at the first use.
 
@@ -140,13 +160,17 @@ class TaskVectorEnv(VectorEnv[Any, Any, Any]):
         shown = array[:, 0] if self.swarm.n_agents == 1 else array
         return shown.copy() if self.copy else shown
 
-    def _info(self, worlds: np.ndarray) -> dict[str, Any]:
-        return {
-            "alive": self.swarm.alive.copy(),
-            "_alive": worlds.copy(),
-            "seed": self.swarm.seeds.copy(),
-            "_seed": worlds.copy(),
-        }
+    def _info(self) -> dict[str, Any]:
+        swarm, every = self.swarm, np.ones(self.num_envs, bool)
+        return _of_worlds(swarm.alive, swarm.seeds, swarm.params, every)
+
+    def _final_info(self, over: np.ndarray) -> dict[str, Any]:
+        """Infos at the end of the episodes that are over, as Gymnasium's own vector environments give them."""
+        swarm = self.swarm
+        info = _of_worlds(swarm.final_alive, swarm.final_seeds, swarm.final_params, over)
+        for name, term in swarm.terms.items():
+            info[name], info[f"_{name}"] = np.where(over, term.sum(axis=1), 0), over.copy()
+        return info
 
     def reset(self, *, seed: Any = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
         """Start new episodes.
@@ -166,7 +190,7 @@ class TaskVectorEnv(VectorEnv[Any, Any, Any]):
         if is_whole(seed):
             super().reset(seed=int(seed))
         self._pictures.follow()
-        return self._seen(self.swarm.obs), self._info(np.ones(self.num_envs, bool))
+        return self._seen(self.swarm.obs), self._info()
 
     def _chosen(self, mask: Any) -> np.ndarray:
         """Numbers of the worlds of a mask; None stands for all."""
@@ -188,12 +212,13 @@ class TaskVectorEnv(VectorEnv[Any, Any, Any]):
                 )
             given = given.reshape(self.num_envs, 1, -1)
         obs, rewards, _, _, _ = swarm.step(given)
-        info = self._info(np.ones(self.num_envs, bool))
+        info = self._info()
         for name, term in swarm.terms.items():
             info[name], info[f"_{name}"] = term.sum(axis=1), np.ones(self.num_envs, bool)
         over = swarm.over.copy()
         if over.any() and swarm.autoreset == "same_step":
             info["final_obs"], info["_final_obs"] = self._seen(swarm.final_obs), over
+            info["final_info"], info["_final_info"] = self._final_info(over), over.copy()
         late = swarm.late & over
         self._pictures.follow()
         return self._seen(obs), rewards.sum(axis=1, dtype=float), over & ~late, late, info
@@ -234,7 +259,7 @@ class TaskEnv(gymnasium.Env[Any, Any]):
         return self._seen(self.swarm.obs), self._info()
 
     def _info(self) -> dict[str, Any]:
-        return {"alive": self.swarm.alive[0].copy(), "seed": int(self.swarm.seeds[0])}
+        return {"alive": self.swarm.alive[0].copy(), "seed": int(self.swarm.seeds[0]), **told_of_one(self.swarm)}
 
     def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         """Play one decision; the reward is the sum over agents."""

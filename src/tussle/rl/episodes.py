@@ -9,8 +9,10 @@ from typing import Any
 import numpy as np
 
 from tussle import rng
+from tussle.batch.variables import Choice, Range
 from tussle.engine.params import Overrides
 from tussle.errors import ParameterError
+from tussle.rl.draws import extremes, named
 from tussle.rl.task import Task
 
 EPISODE = rng.stream_key("tussle.rl", "episode")
@@ -22,17 +24,19 @@ class Episodes:
     """Seeds and parameters of the episodes of W worlds.
 
     The engine holds the values of parameters by world. Kept here is which of them `reset` was given, since variables of the task do
-    not change these.
+    not change these, and distributions, of which each episode draws.
 
     Attributes:
         seeds: Seed of each world's episode, (W,).
-        given: World -> values of the parameters that it was given, by path.
+        given: World -> values or distributions of the parameters that it was given, by path.
+        values: World -> values of the parameters that were given or drawn for its episode, by path, in SI units.
     """
 
     def __init__(self, task: Task, n_worlds: int) -> None:
         self.task = task
         self.seeds = np.random.SeedSequence().generate_state(n_worlds, np.uint64) >> np.uint64(1)
         self.given: dict[int, dict[str, Any]] = {}
+        self.values: list[dict[str, Any]] = [{} for _ in range(n_worlds)]
         self._first, self._number = self.seeds.copy(), np.zeros(n_worlds, np.int64)
 
     def follow(self, worlds: np.ndarray) -> None:
@@ -59,26 +63,56 @@ class Episodes:
             else:
                 self.given.pop(w, None)
 
-    def drawn(self, worlds: np.ndarray) -> dict[str, list[Any]]:
-        """Values of the task's variables in the next episodes of some worlds, by path."""
-        drawn: dict[str, list[Any]] = {}
-        for variable in self.task.variables:
-            name = variable.name
-            shares = rng.uniform(self.seeds[worlds], rng.stream_key("tussle.rl", name), 0, 0)[0]
-            values = [variable.setting(variable.value_at(float(share))) for share in shares]
-            drawn[name] = [
-                self.given.get(w, {}).get(name, v) for w, v in zip(worlds.tolist(), values, strict=True)
+    def drawn(self, worlds: np.ndarray, overrides: Overrides) -> list[tuple[np.ndarray, dict[str, list[Any]]]]:
+        """Draw the parameters of the next episodes of some worlds, and note the values.
+
+        Returns:
+            Worlds, and their values by path, in SI units: those of variables and distributions, of which each world has its own.
+        """
+        varied = {variable.name: variable for variable in self.task.variables}
+        found: dict[str, list[tuple[int, Any]]] = {}
+        for w in worlds.tolist():
+            mine = {**varied, **self.given.get(w, {})}
+            self.values[w] = {path: value for path, value in mine.items() if not isinstance(value, Range | Choice)}
+            for path, value in mine.items():
+                if path in varied or path not in self.values[w]:
+                    found.setdefault(path, []).append((w, value))
+        parts = []
+        for path, items in found.items():
+            some = np.array([w for w, _ in items])
+            shares = rng.uniform(self.seeds[some], rng.stream_key("tussle.rl", path), 0, 0)[0].tolist()
+            values = [
+                v.setting(v.value_at(share)) if isinstance(v, Range | Choice) else v
+                for (_, v), share in zip(items, shares, strict=True)
             ]
-        return drawn
+            converted = [overrides.checked({path: value}, 1)[path][0] for value in values]
+            for w, value in zip(some.tolist(), converted, strict=True):
+                self.values[w][path] = value
+            parts.append((some, {path: converted}))
+        return parts
+
+    def told(self) -> dict[str, Any]:
+        """Parameters that were given or drawn for the present episodes, by path, (W,) or (W, k), as Gymnasium tells them.
+
+        "_PATH" has the worlds that have one, (W,); the others have 0.
+        """
+        out: dict[str, Any] = {}
+        for path in dict.fromkeys(path for mine in self.values for path in mine):
+            have = np.array([path in mine for mine in self.values])
+            first = next(mine[path] for mine in self.values if path in mine)
+            values = np.array([mine.get(path, first) for mine in self.values])
+            values[~have] = values.dtype.type()
+            out[path], out[f"_{path}"] = values, have
+        return out
 
     def state(self) -> tuple[Any, ...]:
         """A copy, for `restore`."""
-        return copy.deepcopy((self.seeds, self._first, self._number, self.given))
+        return copy.deepcopy((self.seeds, self._first, self._number, self.given, self.values))
 
     def restore(self, state: tuple[Any, ...]) -> None:
         """Return to a state."""
-        self.seeds[:], self._first[:], self._number[:], given = state
-        self.given = copy.deepcopy(given)
+        self.seeds[:], self._first[:], self._number[:], given, values = state
+        self.given, self.values = copy.deepcopy(given), copy.deepcopy(values)
 
 
 def checked_worlds(worlds: Any, n_worlds: int) -> np.ndarray:
@@ -157,7 +191,33 @@ def checked_params(params: Any, overrides: Overrides, n_worlds: int) -> dict[str
             raise ParameterError(
                 f"params: {path!r:.80} is not allowed; a path is a text, such as 'prey.speed'"
             )
-    return overrides.checked(params, n_worlds)
+    found: dict[str, list[Any]] = {}
+    for path, value in params.items():
+        is_list = isinstance(value, list | tuple) and any(isinstance(v, Range | Choice) for v in value)
+        if not is_list and not isinstance(value, Range | Choice):
+            found |= overrides.checked({path: value}, n_worlds)
+            continue
+        many = list(value) if is_list else [value] * n_worlds
+        if len(many) != n_worlds:
+            raise ParameterError(
+                f"{path!r} has {len(many)} values for {n_worlds} worlds; give one value or distribution, or one per world"
+            )
+        found[path] = [checked_value(path, v, overrides) for v in many]
+    return found
 
 
-__all__ = ["Episodes", "checked_params", "checked_seeds", "checked_worlds", "is_whole"]
+def checked_value(path: str, value: Any, overrides: Overrides) -> Any:
+    """A value of a parameter in one world, or a distribution of allowed values.
+
+    Raises:
+        ParameterError: The path or a value is not allowed.
+    """
+    if not isinstance(value, Range | Choice):
+        return overrides.checked({path: value}, 1)[path][0]
+    variable = named(value, path)
+    for end in extremes(variable):
+        overrides.checked({path: end}, 1)
+    return variable
+
+
+__all__ = ["Episodes", "checked_params", "checked_seeds", "checked_value", "checked_worlds", "is_whole"]

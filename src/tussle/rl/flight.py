@@ -268,24 +268,30 @@ class LearnedFlight:
         return seen
 
 
-def registered_task(name: str, path: str) -> Task:
-    """The task that is registered under a name.
-
-    Raises:
-        ParameterError: There is none.
-    """
-    known = {
+def registered_tasks() -> dict[str, Any]:
+    """The tasks, or classes of them, that are registered, by id."""
+    return {
         key: spec.kwargs["task"]
         for key, spec in gymnasium.registry.items()
         if spec.entry_point == "tussle.rl.environments:TaskEnv"
     }
+
+
+def registered_task(name: str, where: str) -> Task:
+    """The task that is registered under an id.
+
+    Args:
+        name: The id, such as "tussle/Battle-v0".
+        where: What names it, for the error.
+
+    Raises:
+        ParameterError: There is none.
+    """
+    known = registered_tasks()
     if name not in known:
-        what = (
-            f"there is no task {name!r}{nearest_name(name, known)}"
-            if name
-            else f"{path} names no task; set it"
-        )
-        raise ParameterError(f"Learned.task: {what}; {listed(known)}; `tussle.rl.register` adds others")
+        near = nearest_name(name, known) or nearest_name(f"tussle/{name}-v0", known)
+        what = f"there is no task {name!r}{near}" if name else "no task is named"
+        raise ParameterError(f"{where}: {what}; {listed(known)}; `tussle.rl.register` adds others")
     return task_of(known[name])
 
 
@@ -315,7 +321,8 @@ def load_flight(path: str, task: str, block: str) -> LearnedFlight:
 def _flight(stamps: tuple[tuple[str, tuple[int, int]], ...], task: str, block: str) -> LearnedFlight:
     policies = [_policy(*stamp) for stamp in stamps]
     name = task or policies[0].task
-    return LearnedFlight(policies, registered_task(name, policies[0].path), name, block)
+    where = "Learned.task" if task or not name else f"metadata of {policies[0].path}, {TASK_KEY}"
+    return LearnedFlight(policies, registered_task(name, where), name, block)
 
 
 @lru_cache(maxsize=2 * MOST_POLICIES)
@@ -323,4 +330,4 @@ def _policy(path: str, stamp: tuple[int, int]) -> Policy:
     return Policy(path)
 
 
-__all__ = ["LearnedFlight", "Policy", "load_flight", "registered_task"]
+__all__ = ["LearnedFlight", "Policy", "load_flight", "registered_task", "registered_tasks"]

@@ -13,7 +13,7 @@ from tussle.rl.action import Act
 from tussle.rl.observation import Computed, NearestOthers, Own
 from tussle.rl.reward import Situation, Term, alive, captured, captures, closing
 from tussle.rl.task import Task
-from tussle.stock import Predator, SingleIntegrator
+from tussle.stock import MotorSchemas, MoveToGoalMS, Predator, SingleIntegrator
 
 RADIUS = 2.0
 """Distance along x below which robots are near [m]."""
@@ -100,7 +100,7 @@ class PredatorTeam(Task):
         """The mission, in which the predators of the learner only claim."""
         mission = super().given
         claims = Predator(max_speed=35.0, capture_range=5.0, pursue=False)
-        hunters = set(self.learners.split()) & {"keepers", "switchers"}
+        hunters = {name for name in self.learners.split() if name in ("keepers", "switchers") and self.acts(name)}
         return mission.replace(
             blocks=[b.replace(autonomy=claims) if b.name in hunters else b for b in mission.blocks]
         )
@@ -123,17 +123,23 @@ class PredatorsAndPrey(PredatorTeam):
     reward = {"captures": Term(captures), "captured": Term(captured, -1.0)}  # noqa: RUF012 - declared as ClassVar in Task
 
 
-def robots(count: int, spread: float) -> Mission:
+def robots(count: int, spread: float, **plugins: Any) -> Mission:
     """Robots that move on a line for 100 s.
 
     Args:
         count: How many.
         spread: Half of the range of their first x [m].
+        plugins: Further plugins of the block.
     """
     block = Block(
-        name="robot", count=count, placement="uniform", half_width=(spread, 0.0, 0.0), scatter_first=True, motion=SingleIntegrator()
+        name="robot", count=count, placement="uniform", half_width=(spread, 0.0, 0.0), scatter_first=True, motion=SingleIntegrator(), **plugins
     )  # fmt: skip
     return Mission(blocks=[block], end=100.0, dt=1.0, name="robots")
+
+
+def to_origin() -> MotorSchemas:
+    """The rule of both games: go to the origin at 1 m/s."""
+    return MotorSchemas(max_speed=1.0, behaviors=[MoveToGoalMS()])
 
 
 def x_and_time(simulation: Simulation) -> np.ndarray:
@@ -164,6 +170,7 @@ class NearOrigin(Task):
     """SCRIMMAGE's game RLSimple: a robot goes 1 m/s to the left or right, and is rewarded for each second near the origin."""
 
     mission = robots(1, 10.0)
+    scripted = robots(1, 10.0, autonomy=to_origin())
     learners = "robot"
     observation = (Computed(2, x_and_time),)
     action = (Act("velocity_x", levels=[-1.0, 1.0]),)
@@ -174,6 +181,7 @@ class Consensus(Task):
     """SCRIMMAGE's game RLConsensus: ten robots go 1 m/s to the left or right, and are rewarded for being near each other."""
 
     mission = robots(10, 50.0)
+    scripted = robots(10, 50.0, autonomy=to_origin())
     learners = "robot"
     observation = (Computed(10, all_x),)
     action = (Act("velocity_x", levels=[-1.0, 1.0]),)

@@ -152,7 +152,7 @@ class League:
     ) -> None:
         for file in plugin_files:
             load_plugin_file(file)
-        self.name, own = task, registered_task(task, "the league")
+        self.name, own = task, registered_task(task, "TASK")
         self.sides = ((task, own), (own.opponents, other_side(task, own)))
         self.is_symmetric = own.is_symmetric
         self.players = self._players(players)
@@ -173,7 +173,7 @@ class League:
         for player in (p for text in texts for p in self._named(text.strip())):
             if player.name in found:
                 raise ParameterError(
-                    f"player {player.name!r} is there twice; each has a name of its own, such as late={player.path or player.name}"
+                    f"player {player.name!r} is there twice; each has a name of its own, such as late={player.path or RULES}"
                 )
             found[player.name] = player
         if len(found) > MOST_PLAYERS:
@@ -184,15 +184,15 @@ class League:
 
     def _named(self, text: str) -> list[Contestant]:
         """The player of a text; rules are two where the sides differ."""
-        if text == RULES:
-            if self.is_symmetric:
-                return [Contestant(RULES, "", (0, 1))]
-            return [Contestant(f"{RULES} of {t.learners}", "", (i,)) for i, (_, t) in enumerate(self.sides)]
         name, equals, file = text.partition("=")
+        if (file if equals else text) == RULES:
+            if self.is_symmetric:
+                return [Contestant(name, "", (0, 1))]
+            return [Contestant(f"{name} of {t.learners}", "", (i,)) for i, (_, t) in enumerate(self.sides)]
         path = Path(file if equals else text)
         if not path.is_file():
             raise ParameterError(
-                f"player {text!r}{nearest_name(text, [RULES])}: there is no file {path}; it takes rules, an ONNX file, or NAME=FILE"
+                f"player {text!r}{nearest_name(text, [RULES])}: there is no file {path}; it takes rules, an ONNX file, NAME=rules or NAME=FILE"
             )
         stem = path.resolve().parent.name if path.stem == "policy" else path.stem
         made_for = Policy(str(path)).task or self.name
@@ -216,9 +216,8 @@ class League:
             pairs = list(product(one, two))
         if not pairs:
             sides = " and ".join(t.learners for _, t in self.sides)
-            raise ParameterError(
-                f"there is no game with the players {', '.join(self.players)}; {sides} need one each"
-            )
+            what = "a game has two" if self.is_symmetric else f"{sides} need one each"
+            raise ParameterError(f"there is no game with the players {', '.join(self.players)}; {what}")
         return pairs
 
     def _orders(self, pair: tuple[str, str]) -> list[tuple[str, str]]:
@@ -238,7 +237,7 @@ class League:
             files: Hashes of their files.
         """
         own = self.sides[0][1]
-        mission = (own.replace(mission=own.scripted) if own.scripted else own).given
+        mission = own.by_rule().given
         if own.time_limit is not None:
             mission = mission.replace(end=mission.start + own.time_limit).ending_by_time()
         for name, (task_name, task) in zip((first, second), self.sides, strict=True):

@@ -13,6 +13,7 @@ import numpy as np
 
 from tussle.api.bodies import FLOATS, OFFSETS
 from tussle.errors import ParameterError, listed, nearest_name
+from tussle.neighbors.index import padded
 from tussle.neighbors.lane_count import LANES
 from tussle.neighbors.search import ANY, DIFFERENT, SAME
 from tussle.numeric.kernel import kernel
@@ -32,6 +33,7 @@ OTHERS = {
     "same_team": kernels.SAME_TEAM,
     "present": kernels.PRESENT,
 }
+TEAMS = ("own", "other")
 RELATIVE = {"offset": "pos", "relative_vel": "vel"}
 WHOLE_WORLD = 500
 """Up to this many entities, the nearest others are looked for among all of a world."""
@@ -243,6 +245,11 @@ def _plugin_column(group: Group, path: str) -> tuple[np.ndarray, int, int, int]:
     return table, group.first, place.first, max(1, place.k)
 
 
+def _block_numbers(mission: Mission, names: str) -> list[int]:
+    """Places in a mission of blocks whose names are separated by spaces."""
+    return [i for i, b in enumerate(mission.blocks) if b.name in names.split()]
+
+
 class _Others(Component):
     """Others whose columns are observed; abstract."""
 
@@ -265,25 +272,55 @@ class _Search(_Others):
     """Others that are looked for; abstract.
 
     Attributes:
-        of: Whom: "own" or "other" team, a team number, or None for all.
+        of: Whom: "own" or "other" team, a team number, names of blocks, separated by spaces, or None for all.
         radius: Those further away do not count [m].
     """
 
-    def _wanted(self, part: AgentRows, of: str | int | None) -> tuple[int, np.ndarray]:
+    of: str | int | None
+
+    def _wanted(self, part: AgentRows, simulation: Simulation) -> tuple[int, np.ndarray]:
+        """Mode of the search, and what each agent looks for: a team, or a value of `_classes`."""
+        of = self.of
         if of is None:
             return ANY, part.team
+        if isinstance(of, str) and of not in TEAMS:
+            numbers = _block_numbers(simulation.mission, of)
+            return SAME, np.full(len(part.team), float(numbers[0]) if len(numbers) == 1 else 1.0)
         if isinstance(of, int):
             return SAME, np.full(len(part.team), float(of))
         return (SAME if of == "own" else DIFFERENT), part.team
 
-    def _check_of(self, of: Any, radius: float, needs_radius: bool) -> None:
-        if of not in (None, "own", "other") and not isinstance(of, int):
+    def _classes(self, simulation: Simulation, index: Any, split: Any) -> np.ndarray:
+        """What is looked for by place of an index, (N,): teams; of one block, blocks; of several, 1 for theirs."""
+        bodies, of = simulation.state.population.bodies, self.of
+        if not isinstance(of, str) or of in TEAMS:
+            return bodies.by_place(index, "team", split)[0]
+        blocks, numbers = bodies.by_place(index, "block", split)[0], _block_numbers(simulation.mission, of)
+        if len(numbers) == 1:
+            return blocks
+        found = padded(len(blocks))
+        found[:] = np.isin(blocks, numbers)
+        return found
+
+    def _check_of(self, mission: Mission, radius: float, needs_radius: bool) -> None:
+        of, name = self.of, type(self).__name__
+        if isinstance(of, bool) or not (of is None or isinstance(of, str | int)):
             raise ParameterError(
-                f"{type(self).__name__}: of = {of!r} is not allowed; it takes 'own', 'other', a team number or None"
+                f"{name}: of = {of!r} is not allowed; it takes 'own', 'other', a team number, names of blocks, or None"
             )
+        if isinstance(of, str) and of not in TEAMS:
+            known = [b.name for b in mission.blocks]
+            for block in of.split() or [""]:
+                if block not in known:
+                    raise ParameterError(
+                        f"{name}: of = {of!r}: there is no block {block!r}{nearest_name(block, [*known, *TEAMS])}; "
+                        f"it takes 'own', 'other', a team number, None, or names of blocks; {listed(known)}"
+                    )
+        if isinstance(of, int) and of not in (teams := sorted({b.team for b in mission.blocks})):
+            raise ParameterError(f"{name}: of = {of}: there is no such team; {listed(map(str, teams))}")
         if not radius > 0.0 or (needs_radius and radius == np.inf):
             raise ParameterError(
-                f"{type(self).__name__}: radius = {radius!r} is not allowed; it takes a number > 0"
+                f"{name}: radius = {radius!r} is not allowed; it takes a number > 0"
             )
 
     def _index(
@@ -292,7 +329,7 @@ class _Search(_Others):
         bodies, split = simulation.state.population.bodies, _split_of(simulation)
         index = bodies.any_index() if reach == np.inf else bodies.index(reach, split)
         places = index.row_world, index.place, index.order
-        return bodies.floats, places, (*index.table, bodies.by_place(index, "team", split)[0])
+        return bodies.floats, places, (*index.table, self._classes(simulation, index, split))
 
 
 @dataclass(frozen=True)
@@ -303,7 +340,7 @@ class NearestOthers(_Search):
         k: How many.
         columns: Names, separated by spaces: "offset" and "relative_vel", relative to the agent; "distance"; "direction", the unit
             vector to it; "same_team" and "present", 1 or 0; body columns.
-        of: Whom: "own" or "other" team, a team number, or None for all.
+        of: Whom: "own" or "other" team, a team number, names of blocks, separated by spaces, or None for all.
         radius: Those further away do not count [m].
         scale: As in `Own`, like frame and planar.
     """
@@ -319,7 +356,7 @@ class NearestOthers(_Search):
     def width(self, mission: Mission, block: str) -> int:
         names = self.columns.split()
         _check("NearestOthers", self.frame, names, (*RELATIVE, *OTHERS, *FLOATS), self.scale)
-        self._check_of(self.of, self.radius, False)
+        self._check_of(mission, self.radius, False)
         if self.k < 1:
             raise ParameterError(
                 f"NearestOthers: k = {self.k!r} is not allowed; it takes a whole number >= 1"
@@ -329,7 +366,7 @@ class NearestOthers(_Search):
     def write(self, simulation: Simulation, part: AgentRows, column: int, out: np.ndarray) -> None:
         bodies = simulation.state.population.bodies
         is_small = bodies.n <= WHOLE_WORLD * simulation.n_worlds
-        mode, wanted = self._wanted(part, self.of)
+        mode, wanted = self._wanted(part, simulation)
         numbers = self.k, mode, FRAMES[self.frame], column, self._features[1]
         if self.k > LANES or (self.radius == np.inf and not is_small):
             self._write_apart(simulation, part, wanted, numbers, out)
@@ -376,7 +413,7 @@ class NearestOthers(_Search):
         blocks = index.blocks(first, last, split)
         world_start, keys, strips, _, _, points = index.table
         places = index.members, strips[1], index.order, world_start, keys, points
-        table = *places, bodies.by_place(index, "team", split)[0]
+        table = *places, self._classes(simulation, index, split)
         agent, teams = self._by_row(part, wanted)
         who, found = (agent, first, bodies.team), (blocks.cuts, blocks.spans, blocks.points)
         write, spec = WRITERS[out.dtype]["nearest"], self._features[0]
@@ -399,13 +436,13 @@ class Sectors(_Search):
 
     def width(self, mission: Mission, block: str) -> int:
         _check("Sectors", self.frame, (), (), 1.0)
-        self._check_of(self.of, self.radius, True)
+        self._check_of(mission, self.radius, True)
         if self.n < 1:
             raise ParameterError(f"Sectors: n = {self.n!r} is not allowed; it takes a whole number >= 1")
         return self.n
 
     def write(self, simulation: Simulation, part: AgentRows, column: int, out: np.ndarray) -> None:
-        mode, wanted = self._wanted(part, self.of)
+        mode, wanted = self._wanted(part, simulation)
         floats, places, arrays = self._index(simulation, self.radius)
         numbers = self.n, mode, FRAMES[self.frame], column
         who = part.rows, part.agents
@@ -427,12 +464,12 @@ class Means(_Search):
     def width(self, mission: Mission, block: str) -> int:
         names = self.columns.split()
         _check("Means", self.frame, names, (*RELATIVE, *OTHERS, *FLOATS), self.scale)
-        self._check_of(self.of, self.radius, True)
+        self._check_of(mission, self.radius, True)
         return 1 + self._features[1]
 
     def write(self, simulation: Simulation, part: AgentRows, column: int, out: np.ndarray) -> None:
         spec, width = self._features
-        mode, wanted = self._wanted(part, self.of)
+        mode, wanted = self._wanted(part, simulation)
         floats, places, arrays = self._index(simulation, self.radius)
         numbers = mode, FRAMES[self.frame], column, width, self.count_scale
         who, team = (part.rows, part.agents), simulation.state.population.bodies.team

@@ -8,11 +8,12 @@ from pathlib import Path
 from typing import Any
 
 from tussle import rng
-from tussle.errors import ParameterError
+from tussle.errors import ParameterError, listed
 from tussle.mission import Mission
 from tussle.rl.action import Actor, learned
-from tussle.rl.flight import MOST_POLICIES, registered_task
+from tussle.rl.flight import MOST_POLICIES, registered_task, registered_tasks
 from tussle.rl.policy_file import write_policy
+from tussle.rl.swarm import task_of
 from tussle.rl.task import Task
 from tussle.stock import Learned
 
@@ -30,9 +31,14 @@ def other_side(name: str, task: Task) -> Task:
     """
     if not task.opponents:
         raise ParameterError(
-            f"{name} has no other side; a task names the task of its opponents, such as opponents = 'tussle/BattleBlue-v0'"
+            f"{name} has no other side, since its task has no opponents; {listed(_with_sides())}"
         )
-    return registered_task(task.opponents, f"opponents of {name}")
+    return registered_task(task.opponents, f"{type(task).__name__}.opponents of {name}")
+
+
+def _with_sides() -> list[str]:
+    """Ids of the registered tasks that have another side."""
+    return [name for name, task in registered_tasks().items() if task_of(task).opponents]
 
 
 def with_policy(mission: Mission, name: str, task: Task, policy: str | Path) -> Mission:

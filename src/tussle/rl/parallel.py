@@ -10,7 +10,7 @@ import numpy as np
 from pettingzoo import ParallelEnv
 
 from tussle.errors import ParameterError, nearest_name
-from tussle.rl.environments import Pictures, check_options, metadata_of, reset_one
+from tussle.rl.environments import Pictures, check_options, metadata_of, reset_one, told_of_one
 from tussle.rl.swarm import Swarm
 
 DTYPE, SHAPE = attrgetter("dtype"), attrgetter("shape")
@@ -57,13 +57,14 @@ class TaskParallelEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]  # Pett
     def reset(
         self, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
-        """Start a new episode; `options` may have "params", parameters by path."""
+        """Start a new episode; `options` may have "params", parameters by path. The infos have the seed and the parameters."""
         reset_one(self.swarm, seed, check_options(options))
         self._actions[:] = 0
         self.agents = self._living()
         self._at = self._numbers(self.agents)
         self._pictures.follow()
-        return self._observed(self.agents, self._at), {name: {} for name in self.agents}
+        info = {"seed": int(self.swarm.seeds[0]), **told_of_one(self.swarm)}
+        return self._observed(self.agents, self._at), {name: dict(info) for name in self.agents}
 
     def _living(self) -> list[str]:
         alive = self.swarm.alive[0]

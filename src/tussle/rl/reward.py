@@ -11,6 +11,7 @@ import numpy as np
 from tussle.api.bodies import FLOATS
 from tussle.errors import ParameterError, listed, nearest_name
 from tussle.record.events import CAPTURE, COLLISION, DEATH, FLAG
+from tussle.rl.observation import AgentRows, Component, Means, NearestOthers
 
 if TYPE_CHECKING:
     from tussle.engine.simulation import Simulation
@@ -21,6 +22,23 @@ COUNTED = (CAPTURE, COLLISION, DEATH, FLAG)
 IDS = ("id", "other")
 NOBODY = -1
 """Id of an agent that has not been born; events have 0 for none."""
+
+
+@dataclass(frozen=True)
+class Nearest:
+    """The nearest other of each agent; of agents without one, and of the dead, `distance` is inf and the vectors are 0.
+
+    Attributes:
+        found: Who has one, (W, A).
+        distance: Distance to it [m], (W, A).
+        offset: Vector to it [m], (W, A, 3), world frame.
+        relative_vel: Its velocity relative to the agent's [m/s], (W, A, 3), world frame.
+    """
+
+    found: np.ndarray
+    distance: np.ndarray
+    offset: np.ndarray
+    relative_vel: np.ndarray
 
 
 class Situation:
@@ -46,7 +64,9 @@ class Situation:
         self.rows = self.agents = np.zeros(0, np.int64)
         self._events: list[Any] = []
         self._begun = np.zeros(len(alive), bool)  # worlds whose events belong to an earlier episode
-        self._columns: dict[str, np.ndarray] = {}
+        self.parts: list[AgentRows] = []
+        self._columns: dict[Any, Any] = {}  # of this state
+        self._checked: dict[Component, int] = {}
 
     @property
     def t(self) -> np.ndarray:
@@ -62,6 +82,47 @@ class Situation:
             out[self.agents] = source[..., self.rows].T
             self._columns[name] = out.reshape(*self.alive.shape, *source.shape[:-1])
         return self._columns[name]
+
+    def nearest(self, of: str | int | None = None, radius: float = np.inf, k: int | None = None) -> Nearest:
+        """Return the nearest other of each agent, by a search that does not visit all pairs.
+
+        Args:
+            of: Whom: "own" or "other" team, a team number, names of blocks, separated by spaces, or None for all.
+            radius: Those further away do not count [m].
+            k: Number of others: the arrays get an axis of k behind the agents, nearest first. By default one, without this axis.
+
+        Raises:
+            ParameterError: There is no such team or block, or a value is not allowed.
+        """
+        key = "nearest", of, radius, k
+        if key not in self._columns:
+            many = NearestOthers(k or 1, "offset relative_vel distance present", of, radius, frame="world")
+            values = self._observed(many).reshape(*self.alive.shape, *([] if k is None else [k]), 8)
+            found = values[..., 7] > 0.0
+            distance = np.where(found, values[..., 6], np.inf)
+            self._columns[key] = Nearest(found, distance, values[..., :3], values[..., 3:6])
+        return self._columns[key]  # type: ignore[no-any-return]
+
+    def n_within(self, radius: float, of: str | int | None = None) -> np.ndarray:
+        """Return the number of others within a radius [m] of each agent, (W, A); 0 for the dead. `of` is as in `nearest`.
+
+        Raises:
+            ParameterError: There is no such team or block, or the radius is not allowed.
+        """
+        key = "within", of, radius
+        if key not in self._columns:
+            self._columns[key] = self._observed(Means(radius, "", of)).reshape(self.alive.shape)
+        return self._columns[key]  # type: ignore[no-any-return]
+
+    def _observed(self, component: Component) -> np.ndarray:
+        """What a component observes of the present state, (W A, numbers); 0 for the dead."""
+        if component not in self._checked:
+            mission = self.simulation.mission
+            self._checked[component] = max(component.width(mission, b.name) for b in mission.blocks)
+        out = np.zeros((self.alive.size, self._checked[component]))
+        for part in self.parts:
+            component.write(self.simulation, part, 0, out)
+        return out
 
     def forget(self) -> None:
         """Discard what has been computed from the last states."""
@@ -134,20 +195,10 @@ def collisions(now: Situation) -> np.ndarray:
 
 
 def closing(now: Situation, blocks: str) -> np.ndarray:
-    """Speed at which the distance to the nearest entity of some blocks decreases [m/s], (W, A); 0 without any."""
-    found = [
-        [now.simulation.read(f"{name}.{column}") for name in blocks.split()] for column in ("pos", "vel")
-    ]
-    pos, vel = (np.concatenate([values for values, _ in parts], axis=1) for parts in found)
-    there = np.concatenate([is_there for _, is_there in found[0]], axis=1)
-    offset = np.where(there[:, None, :, None], pos[:, None] - now.pos[:, :, None], np.inf)
-    distance = np.sqrt((offset * offset).sum(axis=-1))
-    near = distance.argmin(axis=-1)
-    length = np.take_along_axis(distance, near[..., None], -1)
-    relative = now.vel - np.take_along_axis(vel[:, None], near[..., None, None], -2)[:, :, 0]
-    with np.errstate(invalid="ignore"):  # where none is left
-        towards = np.take_along_axis(offset, near[..., None, None], -2)[:, :, 0] / length
-        return np.where(np.isfinite(length[..., 0]), (relative * towards).sum(axis=-1), 0.0)
+    """Speed at which the distance to the nearest entity of some blocks decreases [m/s], (W, A); 0 without any, and for the dead."""
+    near = now.nearest(blocks)
+    towards = near.offset / np.maximum(near.distance, 1e-300)[..., None]
+    return -np.asarray((near.relative_vel * towards).sum(axis=-1))
 
 
 @dataclass(frozen=True)
@@ -184,4 +235,4 @@ class Term:
             out *= now.was_alive
 
 
-__all__ = ["Situation", "Term", "alive", "captured", "captures", "closing", "collisions", "died"]
+__all__ = ["Nearest", "Situation", "Term", "alive", "captured", "captures", "closing", "collisions", "died"]

@@ -158,11 +158,8 @@ def headings(now: Situation) -> np.ndarray:
 
 def spacing(now: Situation) -> np.ndarray:
     """1 where the nearest other is neither too near nor too far, (W, A)."""
-    offset = now.pos[:, :, None] - now.pos[:, None]
-    distance = np.sqrt((offset * offset).sum(axis=-1))
-    apart = ~now.alive[:, None, :] | np.eye(distance.shape[1], dtype=bool)
-    nearest = np.where(apart, np.inf, distance).min(axis=-1)
-    return np.asarray(now.alive & (nearest > SPACING[0]) & (nearest < SPACING[1]))
+    distance = now.nearest("robot_0 robot_1 robot_2 robot_3").distance
+    return np.asarray((distance > SPACING[0]) & (distance < SPACING[1]))
 
 
 class Formation(Task):

@@ -10,9 +10,10 @@ from typing import Any, Self
 
 import numpy as np
 
+from tussle.batch.variables import Choice, Range
 from tussle.engine.simulation import Simulation
-from tussle.errors import ParameterError, SnapshotError, listed
-from tussle.rl.episodes import Episodes, checked_params, checked_seeds, checked_worlds
+from tussle.errors import ParameterError, SnapshotError, WiringError, listed
+from tussle.rl.episodes import Episodes, checked_params, checked_seeds, checked_value, checked_worlds
 from tussle.rl.observation import AgentRows
 from tussle.rl.reward import COUNTED, NOBODY, Situation
 from tussle.rl.task import Task
@@ -47,7 +48,8 @@ class Swarm:
 
     Attributes:
         obs: Observations, (W, A, n), as returned.
-        final_obs: Observations at the end of the last episode, (W, A, n), with "same_step".
+        final_obs: Observations at the end of the last episode, (W, A, n), with "same_step"; `final_alive`, `final_seeds` and
+            `final_params` are the others at that time.
         alive: Living agents, (W, A).
         over: Worlds whose episode ended in the last step, (W,); `late` those by the time limit.
         terms: Terms of the last reward, weighted, by name, (W, A) each.
@@ -71,19 +73,17 @@ class Swarm:
         worlds, shape, dtype = self.n_worlds, (self.n_worlds, self.n_agents), task.dtype
         width = max(sum(widths) for widths in task.widths.values())
         self.obs, self.final_obs = np.zeros((*shape, width), dtype), np.zeros((*shape, width), dtype)
+        self.final_alive, self.final_seeds = np.zeros(shape, bool), np.zeros(worlds, np.uint64)
+        self.final_params: dict[str, Any] = {}
         self.rewards, self.returns = np.zeros(shape, dtype), np.zeros(shape)
         self.terms = {name: np.zeros(shape, dtype) for name in task.reward}
         self.terminations, self.truncations, self.alive = np.zeros((3, *shape), bool)
         self.lengths, (self.over, self.late) = np.zeros(worlds, np.int64), np.zeros((2, worlds), bool)
         self.episodes = Episodes(task, worlds)
         self.seeds = self.episodes.seeds
-        self.simulation = Simulation(
-            task.played,
-            self.seeds.tolist(),
-            self.episodes.drawn(np.arange(worlds)),
-            threads=threads,
-            on_error="raise",
-        )
+        self.simulation = Simulation(task.played, self.seeds.tolist(), threads=threads, on_error="raise")
+        for variable in task.variables:
+            checked_value(variable.name, variable, self.simulation.state.overrides)
         self.is_fresh = True
         team = np.array([b.team for b in task.blocks])[task.agent_block]
         self.now = Situation(self.simulation, team, self.alive)
@@ -102,6 +102,7 @@ class Swarm:
         self._ints: np.ndarray | None = None
         self._parts: list[AgentRows] = []
         self._check_ends = True
+        self._told: dict[str, Any] | None = None
 
     # -- episodes ----------------------------------------------------------------------------------------------------------
 
@@ -117,8 +118,9 @@ class Swarm:
             seed: Seed of world 0, world k has seed + k; or one for each of `worlds`; None continues the sequence of each world, or in
                 a list that of one world.
             worlds: Numbers of the worlds, or a mask (W,); by default all.
-            params: Parameters by path, as for `Simulation`: one value, or one for each of `worlds`. A world keeps them in later
-                episodes, besides those it was given before. {} returns to the mission's own values, None keeps the present ones.
+            params: Parameters by path, as for `Simulation`: one value, or one for each of `worlds`; a distribution such as
+                `uniform(10, 20)` gives each episode its own value, by the seed. A world keeps them in later episodes, besides those it
+                was given before. {} returns to the mission's own values, None keeps the present ones.
 
         Returns:
             Observations, (W, A, n).
@@ -135,7 +137,11 @@ class Swarm:
                 self.episodes.set_params(chosen, values)
                 if not values:
                     self.simulation.state.overrides.clear(chosen)
-            self._begin(chosen, values)
+                for path, items in values.items():
+                    fixed = [i for i, item in enumerate(items) if not isinstance(item, Range | Choice)]
+                    own = {path: [items[i] for i in fixed]}
+                    self.simulation.state.overrides.set(own, chosen[fixed])
+            self._begin(np.arange(self.n_worlds) if self.is_fresh else chosen)
             self.over[chosen] = False
             self._observe(None if self.is_fresh else chosen)
         self.is_fresh = False
@@ -162,13 +168,16 @@ class Swarm:
             else:
                 self.episodes.restore(episodes)
                 overrides.restore(params)
+                self._told = None
                 self.is_fresh = True  # another reset has to come first
             raise
 
-    def _begin(self, worlds: np.ndarray, params: Mapping[str, list[Any]] | None = None) -> None:
-        """Restart worlds with their seeds and parameters, of which `params` are new."""
-        drawn = self.episodes.drawn(worlds)
-        self.simulation.reset(worlds, self.seeds[worlds].tolist(), {**drawn, **(params or {})})
+    def _begin(self, worlds: np.ndarray) -> None:
+        """Restart worlds with their seeds and parameters."""
+        overrides, self._told = self.simulation.state.overrides, None
+        for some, drawn in self.episodes.drawn(worlds, overrides):
+            overrides.set(drawn, some)
+        self.simulation.reset(worlds, self.seeds[worlds].tolist())
         self.returns[worlds], self.lengths[worlds] = 0.0, 0
         self._look(worlds)
         self.now.begin(worlds)
@@ -200,6 +209,7 @@ class Swarm:
                 team, span = bodies.team[rows].astype(float), (int(rows[0]), int(rows[-1]) + 1)
                 self._parts.append(AgentRows(name, group, rows, agents, team, kept, span))
         none = [np.zeros(0, np.int64)]
+        self.now.parts = self._parts
         self.now.rows = np.concatenate([*none, *(p.rows for p in self._parts)])
         self.now.agents = np.concatenate([*none, *(p.agents for p in self._parts)])
         self._check_ends = True
@@ -261,6 +271,8 @@ class Swarm:
         if self.autoreset == "same_step" and self.over.any():
             ended = np.flatnonzero(self.over)
             self.final_obs[ended] = self.obs[ended]
+            self.final_alive[ended], self.final_seeds[ended] = self.alive[ended], self.seeds[ended]
+            self.final_params = self.params
             returns, lengths = self.returns[ended], self.lengths[ended]
             self._restart(ended)
             self._observe(ended)
@@ -269,6 +281,13 @@ class Swarm:
         if self.autoreset == "same_step":
             info["final_obs"] = self.final_obs
         return self.obs, self.rewards, self.terminations, self.truncations, info
+
+    @property
+    def params(self) -> dict[str, Any]:
+        """Parameters that were given or drawn for the present episodes, by path, (W,) or (W, k); "_PATH" has the worlds of each."""
+        if self._told is None:
+            self._told = self.episodes.told()
+        return self._told
 
     def _restart(self, worlds: np.ndarray) -> None:
         self.episodes.follow(worlds)
@@ -376,7 +395,7 @@ class Swarm:
         """Return to a state of this swarm, or of another one with the same task and number of worlds."""
         self.simulation.restore(state["simulation"])
         self.episodes.restore(state["episodes"])
-        self._ints = None
+        self._ints = self._told = None
         self._look()
         self.now.id[...] = state["ids"]
         for name in self.KEPT:
@@ -457,13 +476,25 @@ def evaluate(
 
     Returns:
         Sum of each term over agents and decisions, by name, and of all terms as "return"; (n_episodes,) each.
+
+    Raises:
+        ParameterError: No autonomies play the agents' blocks.
     """
     task = task_of(task)
     if policy is None:
-        task = task.replace(mission=task.scripted or task.mission, action=())
+        task = task.by_rule()
         idle = np.zeros((n_episodes, len(task.agent_names), 0), task.dtype)
         policy = lambda _: idle  # noqa: E731
-    with Swarm(task, n_episodes, autoreset="disabled", threads=threads) as swarm:
+    try:
+        made = Swarm(task, n_episodes, autoreset="disabled", threads=threads)
+    except WiringError as error:
+        if task.action:
+            raise
+        raise ParameterError(
+            f"{type(task).__name__}: no autonomies play {task.learners!r} by rule: {error}; "
+            "give scripted = a mission in which they do, or a policy"
+        ) from None
+    with made as swarm:
         obs = swarm.reset(seed=seed)
         sums = {name: np.zeros(n_episodes) for name in swarm.terms}
         is_over = np.zeros(n_episodes, bool)

@@ -5,15 +5,16 @@ from __future__ import annotations
 import copy
 from collections.abc import Mapping, Sequence
 from functools import cached_property
+from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
 from gymnasium import spaces
 
-from tussle.batch.variables import parse_variable
 from tussle.errors import ParameterError, listed, nearest_name
 from tussle.mission import Block, Mission, mission_of
 from tussle.rl.action import Act, Decoder, learned
+from tussle.rl.draws import variables_of
 from tussle.rl.observation import Component
 from tussle.rl.reward import Situation, Term
 
@@ -27,7 +28,8 @@ class Task:
     Attributes:
         mission: A Mission, or the file or name of one.
         overrides: Values of the mission's file, as of `read_mission`.
-        scripted: The mission of `evaluate` without a policy, in which autonomies play the agents' blocks; by default `mission`.
+        scripted: The mission of `evaluate` without a policy, in which autonomies play the agents' blocks; by default `mission`, also
+            where a `mission` was given later than it, by a subclass or as an argument.
         learners: Names of the blocks whose entities are agents, separated by spaces; the others play by their autonomies.
         observation: Components, in order; or one list per block.
         action: What actions set; or one list per block. Blocks with an empty list play by their autonomies.
@@ -35,7 +37,8 @@ class Task:
         decide_every: Steps of the mission per decision. Terms are evaluated once per decision, on the last state; events of all its
             steps count.
         time_limit: Length of an episode, after which it is truncated [s]; by default the mission's.
-        vary: Variables that each episode draws anew, by path as in a batch: "prey.Unicycle.vel_max=20:30".
+        vary: Parameters that each episode draws anew: texts as in a batch, "prey.Unicycle.vel_max=20:30", or distributions by path,
+            {"prey.Unicycle.vel_max": uniform(20, 30)}.
         room: Agents per block, for blocks that gain entities by births of plugins; by default the block's count.
         dtype: Type of observations, rewards and actions.
         opponents: Registered id of the task of the other side, whose learners play against these.
@@ -56,7 +59,7 @@ class Task:
     reward: ClassVar[Mapping[str, Term]] = {}
     decide_every: int = 1
     time_limit: float | None = None
-    vary: Sequence[str] = ()
+    vary: ClassVar[Sequence[str] | Mapping[str, Any]] = ()
     room: ClassVar[Mapping[str, int]] = {}
     dtype: Any = np.float32
     opponents: str = ""
@@ -112,7 +115,24 @@ class Task:
             raise ParameterError(
                 f"{type(self).__name__} has no mission; set mission = a Mission, or the name of one"
             )
+        is_named = isinstance(self.mission, (str, Path))
+        if self.overrides and not is_named and self._age("overrides") <= self._age("mission"):
+            raise ParameterError(
+                f"{type(self).__name__}: overrides = {self.overrides!r} is not allowed with a mission made in Python; "
+                "give mission = ... .replace(...)"
+            )
         return mission_of(self.mission, f"{type(self).__name__}.mission", self.overrides)[0]
+
+    def by_rule(self) -> Task:
+        """This task without actions, in the mission in which autonomies play the agents' blocks."""
+        if self.scripted is None or self._age("scripted") > self._age("mission"):
+            return self.replace(action=())
+        values = {"mission": self.scripted, "action": ()}
+        return self.replace(**values if isinstance(self.scripted, (str, Path)) else {**values, "overrides": {}})
+
+    def _age(self, name: str) -> int:
+        """How far back an attribute was set: -1 as an argument, else by the class at this place in the order of classes."""
+        return -1 if name in self._given else next(i for i, c in enumerate(type(self).__mro__) if name in vars(c))
 
     @cached_property
     def blocks(self) -> list[Block]:
@@ -176,7 +196,7 @@ class Task:
 
     @cached_property
     def variables(self) -> list[Any]:
-        return [parse_variable(text) for text in self.vary]
+        return variables_of(self.vary, type(self).__name__)
 
     @cached_property
     def capacities(self) -> list[int]:

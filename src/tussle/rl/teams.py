@@ -182,10 +182,8 @@ def balance(now: Situation) -> np.ndarray:
 
 def hits(now: Situation, enemy: str) -> np.ndarray:
     """Enemies within reach, which the agent hits and which hit it, (W, A)."""
-    pos, there = now.simulation.read(f"{enemy}.pos")
-    squares = ((now.pos[..., None, k] - pos[:, None, :, k]) ** 2 for k in range(3))
     reach: Any = Fire.reach.default
-    return np.asarray(((sum(squares) < reach * reach) & there[:, None]).sum(axis=-1))
+    return now.n_within(reach, enemy)
 
 
 class Battle(Task):

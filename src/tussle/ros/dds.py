@@ -118,10 +118,12 @@ class Ros2Link(NodeLink):
         """Return a time as messages hold it."""
         return seconds, nanoseconds
 
-    def odometry(self, topic: str, frame: str, child: str) -> Callable[[Any, list[float]], None]:
-        """Announce odometry; returns publish(stamp, state)."""
+    def odometry(
+        self, topic: str, frame: str, child: str
+    ) -> Callable[[Any, list[float], np.ndarray | None], None]:
+        """Announce odometry; returns publish(stamp, state, covariances)."""
         writer, pack = self.advertise(topic, "nav_msgs/Odometry"), odometry_bytes(frame, child)
-        return lambda stamp, state: writer.publish(pack(stamp, state))
+        return lambda stamp, state, covariances: writer.publish(pack(stamp, state, covariances))
 
     def scan(self, topic: str, frame: str) -> Callable[[Any, Any, np.ndarray], None]:
         """Announce scans; returns publish(stamp, about, ranges)."""
@@ -134,13 +136,13 @@ class Ros2Link(NodeLink):
         writer = self.advertise("tf", "tf2_msgs/TFMessage", TF_QUEUE)
         return lambda transforms: writer.publish(transforms_bytes(transforms))
 
-    def imu(self, topic: str, frame: str) -> Callable[[Any, list[float], list[float], list[float]], None]:
-        """Announce imu; returns publish(stamp, quat, rate, force)."""
+    def imu(self, topic: str, frame: str) -> Callable[..., None]:
+        """Announce imu; returns publish(stamp, quat, rate, force, variances)."""
         writer, pack = (
             self.advertise(topic, "sensor_msgs/Imu", SENSOR_QUEUE, is_reliable=False),
             imu_bytes(frame),
         )
-        return lambda stamp, quat, rate, force: writer.publish(pack(stamp, quat, rate, force))
+        return lambda *measured: writer.publish(pack(*measured))
 
     def compass(self, topic: str, frame: str) -> Callable[[Any, list[float]], None]:
         """Announce compass; returns publish(stamp, field)."""
@@ -153,9 +155,10 @@ class Ros2Link(NodeLink):
         writer = self.advertise("clock", "rosgraph_msgs/Clock")
         return lambda stamp: writer.publish(clock_bytes(stamp))
 
-    def twist(self, topic: str, take: Callable[[tuple[float, ...]], None]) -> Any:
+    def twist(self, topic: str, take: Callable[[tuple[float, ...]], None], is_stamped: bool) -> Any:
         """Call take(values) for each command, six numbers. Returns the subscriber."""
-        return self.subscribe(topic, "geometry_msgs/Twist", lambda data: take(twist_values(data)))
+        type_ = "geometry_msgs/TwistStamped" if is_stamped else "geometry_msgs/Twist"
+        return self.subscribe(topic, type_, lambda data: take(twist_values(data, is_stamped)))
 
     def advertise(self, topic: str, type_: str, depth: int = QUEUE, is_reliable: bool = True) -> TopicWriter:
         """Announce a topic."""

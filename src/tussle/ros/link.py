@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from tussle.ros.node import MASTER_TIMEOUT, master_fault, master_uri, started_node
-from tussle.ros.steps import NodeLink, Transform
+from tussle.ros.steps import NodeLink, Transform, of_equal_axes
 
 QUEUE = 10
 """Messages that wait for a slow subscriber; older ones are dropped, so that it does not delay the simulation."""
@@ -75,14 +75,18 @@ class RosLink(NodeLink):
         """Return a time as messages hold it."""
         return self.ros.Time(seconds, nanoseconds)
 
-    def odometry(self, topic: str, frame: str, child: str) -> Callable[[Any, list[float]], None]:
-        """Announce odometry; returns publish(stamp, state)."""
+    def odometry(
+        self, topic: str, frame: str, child: str
+    ) -> Callable[[Any, list[float], np.ndarray | None], None]:
+        """Announce odometry; returns publish(stamp, state, covariances)."""
         message = self.ros.Odometry(child_frame_id=child)
         message.header.frame_id = frame
         publisher = self.advertise(topic, self.ros.Odometry)
 
-        def publish(stamp: Any, state: list[float]) -> None:
+        def publish(stamp: Any, state: list[float], covariances: np.ndarray | None) -> None:
             message.header.stamp = stamp
+            if covariances is not None:
+                message.pose.covariance, message.twist.covariance = covariances
             _set(message.pose.pose.position, state[:3])
             _turn(message.pose.pose.orientation, state[3:7])
             _set(message.twist.twist.linear, state[7:10])
@@ -127,17 +131,22 @@ class RosLink(NodeLink):
             messages.append(message)
         self.publish("tf", self.ros.TFMessage(messages))
 
-    def imu(self, topic: str, frame: str) -> Callable[[Any, list[float], list[float], list[float]], None]:
-        """Announce imu; returns publish(stamp, quat, rate, force)."""
+    def imu(self, topic: str, frame: str) -> Callable[..., None]:
+        """Announce imu; returns publish(stamp, quat, rate, force, variances)."""
         message = self.ros.Imu()
         message.header.frame_id = frame
         publisher = self.advertise(topic, self.ros.Imu)
 
-        def publish(stamp: Any, quat: list[float], rate: list[float], force: list[float]) -> None:
+        def publish(
+            stamp: Any, quat: list[float], rate: list[float], force: list[float], variances: list[float]
+        ) -> None:
             message.header.stamp = stamp
             _turn(message.orientation, quat)
             _set(message.angular_velocity, rate)
             _set(message.linear_acceleration, force)
+            message.angular_velocity_covariance, message.linear_acceleration_covariance = map(
+                of_equal_axes, variances
+            )
             publisher.publish(message)
 
         return publish
@@ -160,14 +169,15 @@ class RosLink(NodeLink):
         publisher = self.advertise("clock", self.ros.Clock)
         return lambda stamp: publisher.publish(self.ros.Clock(stamp))
 
-    def twist(self, topic: str, take: Callable[[tuple[float, ...]], None]) -> Any:
+    def twist(self, topic: str, take: Callable[[tuple[float, ...]], None], is_stamped: bool) -> Any:
         """Call take(values), in another thread, for each command. Returns the subscriber."""
 
         def hear(message: Any) -> None:
-            linear, angular = message.linear, message.angular
+            command = message.twist if is_stamped else message
+            linear, angular = command.linear, command.angular
             take((linear.x, linear.y, linear.z, angular.x, angular.y, angular.z))
 
-        return self.subscribe(topic, self.ros.Twist, hear, 1)
+        return self.subscribe(topic, self.ros.TwistStamped if is_stamped else self.ros.Twist, hear, 1)
 
     def unsubscribe(self, subscriber: Any) -> None:
         """Do nothing: all subscriptions are withdrawn at the end, if the master is still there."""

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from tussle.errors import MissingExtraError
-from tussle.ros.steps import Transform
+from tussle.ros.steps import Transform, of_equal_axes
 
 DEFINITIONS = {
     "builtin_interfaces/Time": "int32 sec, uint32 nanosec",
@@ -25,6 +25,7 @@ DEFINITIONS = {
     "geometry_msgs/Pose": "geometry_msgs/Point position, geometry_msgs/Quaternion orientation",
     "geometry_msgs/PoseWithCovariance": "geometry_msgs/Pose pose, float64[36] covariance",
     "geometry_msgs/Twist": "geometry_msgs/Vector3 linear, geometry_msgs/Vector3 angular",
+    "geometry_msgs/TwistStamped": "std_msgs/Header header, geometry_msgs/Twist twist",
     "geometry_msgs/TwistWithCovariance": "geometry_msgs/Twist twist, float64[36] covariance",
     "geometry_msgs/Transform": "geometry_msgs/Vector3 translation, geometry_msgs/Quaternion rotation",
     "geometry_msgs/TransformStamped": "std_msgs/Header header, string child_frame_id, geometry_msgs/Transform transform",
@@ -44,6 +45,7 @@ DEFINITIONS = {
 TYPE_HASHES = {
     "std_msgs/Bool": "RIHS01_feb91e995ff9ebd09c0cb3d2aed18b11077585839fb5db80193b62d74528f6c9",
     "std_msgs/Empty": "RIHS01_20b625256f32d5dbc0d04fee44f43c41e51c70d3502f84b4a08e7a9c26a96312",
+    "geometry_msgs/TwistStamped": "RIHS01_5f0fcd4f81d5d06ad9b4c4c63e3ea51b82d6ae4d0558f1d475229b1121db6f64",
     "geometry_msgs/Twist": "RIHS01_9c45bf16fe0983d80e3cfe750d6835843d265a9a6c46bd2e609fcddde6fb8d2a",
     "nav_msgs/Odometry": "RIHS01_3cc97dc7fb7502f8714462c526d369e35b603cfc34d946e3f2eda2766dfec6e0",
     "rosgraph_msgs/Clock": "RIHS01_692f7a66e93a3c83e71765d033b60349ba68023a8c689a79e48078bcb5c58564",
@@ -93,15 +95,17 @@ def message_type(name: str) -> Any:
     return message
 
 
-def odometry_bytes(frame: str, child: str) -> Callable[[Stamp, Sequence[float]], bytes]:
-    """What packs nav_msgs/Odometry: pack(stamp, state), of a state as that of `NodeLink.odometry`."""
+def odometry_bytes(frame: str, child: str) -> Callable[[Stamp, Sequence[float], np.ndarray | None], bytes]:
+    """What packs nav_msgs/Odometry: pack(stamp, state, covariances), which are those of `NodeLink.odometry`."""
     (frame_text, frame_name), (child_text, child_name) = _text(frame), _text(child)
-    # Fields with native alignment are aligned as in CDR; the covariances are 0.
-    pack = struct.Struct(f"@2i{frame_text}{child_text}7d288x6d288x").pack
+    # Fields with native alignment are aligned as in CDR.
+    pack = struct.Struct(f"@2i{frame_text}{child_text}7d288s6d288s").pack
 
-    def packed(stamp: Stamp, state: Sequence[float]) -> bytes:
+    def packed(stamp: Stamp, state: Sequence[float], covariances: np.ndarray | None) -> bytes:
         x, y, z, qw, qx, qy, qz, *twist = state
-        return ENCAPSULATION + pack(*stamp, *frame_name, *child_name, x, y, z, qx, qy, qz, qw, *twist)
+        of_pose, of_twist = (b"", b"") if covariances is None else (each.tobytes() for each in covariances)
+        values = x, y, z, qx, qy, qz, qw, of_pose, *twist, of_twist
+        return ENCAPSULATION + pack(*stamp, *frame_name, *child_name, *values)
 
     return packed
 
@@ -129,14 +133,21 @@ def scan_bytes(frame: str) -> Callable[[Stamp, Any, np.ndarray], bytes]:
     return packed
 
 
-def imu_bytes(frame: str) -> Callable[[Stamp, Sequence[float], Sequence[float], Sequence[float]], bytes]:
-    """What packs sensor_msgs/Imu: pack(stamp, quat, rate, force)."""
+def imu_bytes(frame: str) -> Callable[..., bytes]:
+    """What packs sensor_msgs/Imu: pack(stamp, quat, rate, force, variances), which are those of `NodeLink.imu`."""
     text, name = _text(frame)
-    pack = struct.Struct(f"@2i{text}4d72x3d72x3d72x").pack
+    pack = struct.Struct(f"@2i{text}4d72x3d9d3d9d").pack
 
-    def packed(stamp: Stamp, quat: Sequence[float], rate: Sequence[float], force: Sequence[float]) -> bytes:
+    def packed(
+        stamp: Stamp,
+        quat: Sequence[float],
+        rate: Sequence[float],
+        force: Sequence[float],
+        variances: Sequence[float],
+    ) -> bytes:
         w, x, y, z = quat
-        return ENCAPSULATION + pack(*stamp, *name, x, y, z, w, *rate, *force)
+        of_rate, of_force = map(of_equal_axes, variances)
+        return ENCAPSULATION + pack(*stamp, *name, x, y, z, w, *rate, *of_rate, *force, *of_force)
 
     return packed
 
@@ -153,9 +164,15 @@ def clock_bytes(stamp: Stamp) -> bytes:
     return ENCAPSULATION + struct.pack("@2i", *stamp)
 
 
-def twist_values(data: bytes) -> tuple[float, ...]:
-    """Six numbers of geometry_msgs/Twist. Cyclone DDS itself drops what is none, and warns of it."""
-    return struct.unpack_from("<6d" if data[1] & 1 else ">6d", data, 4)
+def twist_values(data: bytes, is_stamped: bool = False) -> tuple[float, ...]:
+    """Six numbers of geometry_msgs/Twist or TwistStamped. Cyclone DDS itself drops what is none, and warns of it."""
+    order, begin = "<" if data[1] & 1 else ">", len(ENCAPSULATION)
+    if is_stamped:
+        n_before = (
+            12 + struct.unpack_from(f"{order}I", data, begin + 8)[0]
+        )  # time, length and text of the frame
+        begin += n_before + -n_before % 8
+    return struct.unpack_from(f"{order}6d", data, begin)
 
 
 def _text(text: str) -> tuple[str, tuple[int, bytes]]:

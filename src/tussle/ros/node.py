@@ -23,7 +23,7 @@ DEFAULT_URI = "http://localhost:11311"
 MASTER_TIMEOUT = 2.0
 """Longest wait for an answer of the master [s]."""
 MESSAGES = {
-    "geometry_msgs.msg": "TransformStamped Twist",
+    "geometry_msgs.msg": "TransformStamped Twist TwistStamped",
     "nav_msgs.msg": "Odometry",
     "rosgraph_msgs.msg": "Clock",
     "sensor_msgs.msg": "Imu LaserScan MagneticField",

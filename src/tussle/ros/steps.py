@@ -30,6 +30,11 @@ class Transform(NamedTuple):
     pose: list[float]
 
 
+def of_equal_axes(variance: float) -> tuple[float, ...]:
+    """Covariance matrix, row by row, of three independent axes with the same variance."""
+    return variance, 0.0, 0.0, 0.0, variance, 0.0, 0.0, 0.0, variance
+
+
 class StepGate:
     """Pauses a simulation between two steps and lets single steps pass.
 
@@ -100,6 +105,7 @@ class NodeLink(ABC):
         news: Notified when a command has come.
         lost: Why no message can come any more; empty while they can.
         is_sim_time: Whether stamps are simulated time; otherwise they are the wall clock's.
+        namespaces: Id -> namespace of each robot that publishes its frames, which frames of its sensors have too.
         system: Name of the kind of ROS.
         settling_time: Time after which peers that are known here know this link too [s].
     """
@@ -111,6 +117,7 @@ class NodeLink(ABC):
         self.groups: dict[int, tuple[Any, Any]] = {}
         self.news, self.lost, self.is_sim_time = threading.Condition(), "", False
         self.gate, self._rest = StepGate(rest), rest or self.news.wait
+        self.namespaces: dict[int, str] = {}
         self._topics: dict[str, Any] = {}
         self._step = -1
 
@@ -120,15 +127,22 @@ class NodeLink(ABC):
         link: Self = share(cls.system, cls)
         return link
 
+    def base_link(self, id_: int, namespace: str) -> str:
+        """The frame of a robot's body; below `namespace` if the robot publishes none."""
+        return f"{self.namespaces.get(id_, namespace)}/base_link"
+
     @abstractmethod
     def time_of(self, seconds: int, nanoseconds: int) -> Any:
         """Return a time as messages hold it."""
 
     @abstractmethod
-    def odometry(self, topic: str, frame: str, child: str) -> Callable[[Any, list[float]], None]:
-        """Announce odometry; returns publish(stamp, state).
+    def odometry(
+        self, topic: str, frame: str, child: str
+    ) -> Callable[[Any, list[float], np.ndarray | None], None]:
+        """Announce odometry; returns publish(stamp, state, covariances).
 
-        A state is position, attitude (w, x, y, z), velocity and angular velocity in the body frame, 13 numbers.
+        A state is position, attitude (w, x, y, z), velocity and angular velocity in the body frame, 13 numbers. Covariances are those of
+        pose and twist, (2, 36), or None where both are exact.
         """
 
     @abstractmethod
@@ -140,8 +154,11 @@ class NodeLink(ABC):
         """Announce tf; returns publish(transforms)."""
 
     @abstractmethod
-    def imu(self, topic: str, frame: str) -> Callable[[Any, list[float], list[float], list[float]], None]:
-        """Announce imu; returns publish(stamp, quat, rate, force): attitude, rotation and specific force in the body frame."""
+    def imu(self, topic: str, frame: str) -> Callable[..., None]:
+        """Announce imu; returns publish(stamp, quat, rate, force, variances).
+
+        These are attitude, rotation and specific force in the body frame, and the variances of an axis of the rotation and of the force.
+        """
 
     @abstractmethod
     def compass(self, topic: str, frame: str) -> Callable[[Any, list[float]], None]:
@@ -152,8 +169,8 @@ class NodeLink(ABC):
         """Announce clock; returns publish(stamp)."""
 
     @abstractmethod
-    def twist(self, topic: str, take: Callable[[tuple[float, ...]], None]) -> Any:
-        """Call take(values) for each command, six numbers. Returns the subscriber."""
+    def twist(self, topic: str, take: Callable[[tuple[float, ...]], None], is_stamped: bool) -> Any:
+        """Call take(values) for each command, six numbers of a Twist or a TwistStamped. Returns the subscriber."""
 
     @abstractmethod
     def unsubscribe(self, subscriber: Any) -> None:

@@ -86,8 +86,17 @@ class EntityState:
     said: list[ShownMessage] = field(default_factory=list)
 
 
-def entity_state(simulation: Simulation, world: int, who: int) -> EntityState | None:
-    """The entity with an id; None if it does not exist. Of a world that has ended, its last state."""
+def entity_state(
+    simulation: Simulation, world: int, who: int, *, has_messages: bool = True
+) -> EntityState | None:
+    """The entity with an id; None if it does not exist. Of a world that has ended, its last state.
+
+    Args:
+        simulation: The simulation; used between steps only.
+        world: Number of the world.
+        who: The id.
+        has_messages: Read its messages, too.
+    """
     parked = simulation.state.parked.get(world)
     bodies = simulation.state.population.bodies if parked is None else parked.bodies
     found = np.flatnonzero((bodies.id == who) & (bodies.world == world))
@@ -116,13 +125,13 @@ def entity_state(simulation: Simulation, world: int, who: int) -> EntityState | 
         if parked is None:
             if group.first <= row < group.last:
                 _read_plugins(group, row - group.first, group.table, state.plugins)
-                state.heard.extend(_heard(group, world, who))
+                state.heard.extend(_heard(group, world, who) if has_messages else ())
         elif group.key in parked.tables:
             rows, held = parked.tables[group.key]
             place = np.flatnonzero(rows == row)
             if len(place):
                 _read_plugins(group, int(place[0]), held, state.plugins)
-    state.said.extend(_said(simulation, world, who))
+    state.said.extend(_said(simulation, world, who) if has_messages else ())
     return state
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from functools import cached_property
 from typing import Any, Self
 
@@ -15,6 +15,7 @@ from tussle.engine.simulation import Simulation
 from tussle.engine.step_end import world_result
 from tussle.errors import ParameterError, PluginError
 from tussle.messages import CustomKeyPress, Message, WorldPointClicked
+from tussle.view.curves import GameCurves
 from tussle.view.drawn import DrawCollector, Shape
 from tussle.view.entity import EntityState, entity_state
 from tussle.view.frame import Event, Frame, Lens
@@ -23,6 +24,7 @@ from tussle.view.pacing import Pace, checked_warp, faster, slower
 from tussle.view.playback import Order, PlaybackController
 from tussle.view.player import Injection, Player
 from tussle.view.scenery import Scenery, scenery_of
+from tussle.view.series import CurveName
 from tussle.view.sight import fields_of_view
 from tussle.view.style import Style
 
@@ -237,7 +239,8 @@ class Live:
 
     # -- state ----------------------------------------------------------------------------------------------------------------------
 
-    def _time_of(self, step: int) -> float:
+    def time_of(self, step: int) -> float:
+        """Time at the beginning of a step [s]."""
         return float(self._clock.start + step * self._clock.dt)
 
     def _step_at(self, t: float) -> int:
@@ -254,12 +257,12 @@ class Live:
     @property
     def t(self) -> float:
         """Time of the visible state [s]."""
-        return self._time_of(self._playback.shown[0])
+        return self.time_of(self._playback.shown[0])
 
     @property
     def span(self) -> tuple[float, float]:
         """First and last simulated time [s]."""
-        return self._time_of(self._player.first_step), self._time_of(self._player.last_step)
+        return self.time_of(self._player.first_step), self.time_of(self._player.last_step)
 
     @property
     def seed(self) -> int:
@@ -314,6 +317,15 @@ class Live:
     def injections(self) -> list[Injection]:
         """Messages to the plugins from outside."""
         return list(self._player.injections)
+
+    @property
+    def curves(self) -> GameCurves:
+        """Quantities in each step so far."""
+        return self._player.curves
+
+    def watch(self, wanted: Collection[CurveName]) -> None:
+        """Add these columns of entities to the curves from the present step on; columns that are not named leave them."""
+        self._give(lambda: self._player.curves.watch(wanted, self._player.step))
 
     # -- observations -------------------------------------------------------------------------------------------------------------
 

@@ -10,6 +10,7 @@ import numpy as np
 from tussle.engine.simulation import Simulation
 from tussle.messages import Message, Messages
 from tussle.record import Events
+from tussle.view.curves import GameCurves
 from tussle.view.frame import Event, frame_of
 from tussle.view.timeline import History, Timeline
 
@@ -56,6 +57,7 @@ class Player:
     Attributes:
         timeline: Snapshots.
         history: Past frames.
+        curves: What its quantities were in each step.
         step: Present step of the world.
         injections: Messages from outside, in order of their steps.
         events: Births, deaths, captures, collisions, ends, in order.
@@ -70,6 +72,7 @@ class Player:
         self.injections: list[Injection] = []
         self.events: list[Event] = []
         self.notes: list[str] = []
+        self.curves = GameCurves(simulation, world, self.note)
         self.is_broken = False
         self._has_new_episode = False
         self.step = self._read_step()
@@ -127,22 +130,24 @@ class Player:
         has_new_episode, self._has_new_episode = self._has_new_episode, False
         self.step = self._furthest_step = step
         self.history.offer(step)
+        self.curves.offer(step)
         return has_new_episode
 
     def _begin_episode(self, step: int) -> None:
         self._has_new_episode = True
         self.events.clear()
         self.history.clear()
+        self.curves.clear()
         self.step = self.first_step = step
 
     def rest(self, seconds: float) -> None:
-        """Grant time for snapshots and history: the game has waited this long [s]."""
-        self.timeline.rest(seconds)
-        self.history.rest(seconds)
+        """Grant time for curves, snapshots and history: the game has waited this long [s]."""
+        for part in (self.timeline, self.history, self.curves):
+            part.rest(seconds)
 
     def _remember(self) -> None:
-        self.history.offer(self.step)
-        self.timeline.offer(self.step)
+        for part in (self.curves, self.history, self.timeline):
+            part.offer(self.step)
 
     # -- backwards ----------------------------------------------------------------------------------------------------------------
 
@@ -165,6 +170,7 @@ class Player:
         if nearest is not None and (is_back or nearest[0] > here):
             self.simulation.restore(nearest[1])
             self.is_broken, self.step = False, nearest[0]
+            self.curves.offer(self.step, is_after_gap=True)
         return step
 
     # -- another course -----------------------------------------------------------------------------------------------------------
@@ -183,8 +189,8 @@ class Player:
         step = self.step
         if step < self._furthest_step:
             self._end_recordings()
-            self.timeline.forget_after(step)
-            self.history.forget_after(step)
+            for part in (self.timeline, self.history, self.curves):
+                part.forget_after(step)
             self.injections[:] = [sent for sent in self.injections if sent.step <= step]
             self._forget_events(step)
             self._furthest_step = step
@@ -198,7 +204,7 @@ class Player:
     def reset(self, seed: int | None) -> None:
         """Restart the world, with another seed if one is given."""
         self._end_recordings()
-        for part in (self.timeline, self.history):
+        for part in (self.timeline, self.history, self.curves):
             part.clear()
         self.injections.clear()
         self.events.clear()

@@ -10,11 +10,15 @@ from typing import Any
 
 import numpy as np
 import pyarrow as pa
+import pyarrow.compute as pc
 
 from tussle.api.draw import KINDS
-from tussle.errors import RecordError, TussleError
-from tussle.mission import Loaded, Mission, read_mission
+from tussle.batch.trust import DirectoryCode
+from tussle.errors import ParameterError, RecordError, TussleError, listed, nearest_name
+from tussle.mission import Loaded, Mission, PluginFile, read_mission
 from tussle.record import Run, load_run
+from tussle.record.plugin_columns import PluginColumn
+from tussle.record.plugin_copies import copied_plugins
 from tussle.record.schema import MISSION_FILE, RUN_FILE, SHAPES_FILE, TRAJECTORY_FILE
 from tussle.view.drawn import Shape
 from tussle.view.frame import Event, Frame, empty_frame
@@ -29,6 +33,14 @@ MOST_SAMPLED = 60
 POS, QUAT, VEL = ("x", "y", "z"), ("qw", "qx", "qy", "qz"), ("vx", "vy", "vz")
 
 
+def masked(column: pa.ChunkedArray) -> np.ma.MaskedArray[Any, Any]:
+    """Numbers of a table's column, (n,), masked where they are null."""
+    return np.ma.array(
+        pc.fill_null(column, False if column.type == pa.bool_() else 0).to_numpy(),
+        mask=column.is_null().to_numpy(),
+    )
+
+
 class Recording:
     """One world of a run directory, complete or not.
 
@@ -37,7 +49,7 @@ class Recording:
     Args:
         path: The run directory.
         world: Number of the world.
-        plugin_files: Python files with plugins of the run's mission.
+        plugin_files: Python files with plugins of the run's mission; by default those that the directory holds, if the user's own.
         is_mapped: States stay in their file and are checked when a frame is made of them, so a run of any size opens at once. Extent
             and teams are then those of at most `MOST_SAMPLED` frames, evenly spaced.
 
@@ -266,6 +278,33 @@ class Recording:
             self._check(step, ids, block, pos, quat)
         return Frame(t, step, ids, team, block, pos, quat, vel, self._column(first, last, "health"))
 
+    @property
+    def columns(self) -> dict[str, PluginColumn]:
+        """Columns of plugins that were recorded with the states, by name."""
+        return self.run.columns
+
+    @cached_property
+    def parts(self) -> set[str]:
+        """Columns of the table of states that belong to plugins."""
+        return {part for column in self.columns.values() for part in column.parts}
+
+    def values(self, i: int, name: str) -> np.ma.MaskedArray[Any, Any]:
+        """Values of a column of plugins in a frame, (n, k), in the order of its ids; masked where an entity does not have the column.
+
+        Raises:
+            ParameterError: The column was not recorded.
+        """
+        if name not in self.columns:
+            known = self.columns
+            raise ParameterError(
+                f"{self.path}: no column {name!r} was recorded{nearest_name(name, known)}; {listed(known)}"
+            )
+        first, n = int(self._first[i]), int(self._last[i] - self._first[i])
+        return np.ma.stack(
+            [masked(self.run.trajectory_table[part].slice(first, n)) for part in self.columns[name].parts],
+            axis=1,
+        )
+
     def _check(
         self, step: int, ids: np.ndarray, block: np.ndarray, pos: np.ndarray, quat: np.ndarray
     ) -> None:
@@ -283,6 +322,24 @@ class Recording:
             wrong = "a position or an attitude is not finite"
         if wrong:
             raise RecordError(f"{self.path / TRAJECTORY_FILE}: step {step}: {wrong}")
+
+    def team_column(self, i: int) -> np.ndarray:
+        """Team of each entity of a frame, (n,)."""
+        first, last = int(self._first[i]), int(self._last[i])
+        return self._column(first, last, "team") if last > first else np.zeros(0, np.int32)
+
+    def row_of(self, i: int, who: int) -> int:
+        """Row of an entity in the table at a frame; -1 if it is not there."""
+        first, last = int(self._first[i]), int(self._last[i])
+        if first == last:
+            return -1
+        ids = self._column(first, last, "id")
+        place = int(np.searchsorted(ids, who))
+        return first + place if place < len(ids) and ids[place] == who else -1
+
+    def value(self, row: int, name: str) -> float:
+        """A column of the table in a row."""
+        return float(self._column(row, row + 1, name)[0])
 
     def at(self, t: float) -> Frame:
         """The last frame that is not after a time [s]; the first for times before it.
@@ -339,6 +396,17 @@ class Recording:
         found = [Event(*row) for row in zip(*rows, strict=True)]
         return sorted(found, key=lambda event: event.t)
 
+    @cached_property
+    def results(self) -> dict[tuple[str, int | None], tuple[list[float], list[float]]]:
+        """Name and team of each score and result that was recorded -> times of its changes [s], and values."""
+        found: dict[tuple[str, int | None], tuple[list[float], list[float]]] = {}
+        table = self.run.results_table
+        for row in table.filter(pc.equal(table["world"], self.world)).to_pylist():
+            t, values = found.setdefault((row["name"], row["team"]), ([], []))
+            t.append(row["t"])
+            values.append(row["value"])
+        return found
+
     # -- shapes of plugins ------------------------------------------------------------------------------------------------------
 
     @cached_property
@@ -389,7 +457,9 @@ class Recording:
             )
             return None
         try:
-            loaded = read_mission(path.resolve(), strict=False, plugin_files=self._plugin_files)
+            loaded = read_mission(
+                path.resolve(), strict=False, plugin_files=self._plugin_files or self._own_plugins()
+            )
             self.notes.extend(note for note in loaded.notes if "<terrain>" in note)
             return loaded
         except TussleError as error:
@@ -398,6 +468,20 @@ class Recording:
                 f"{MISSION_FILE} cannot be read, so its colours, bases and boundaries are not shown: {first}"
             )
             return None
+
+    def _own_plugins(self) -> tuple[PluginFile, ...]:
+        """The plugin files in the directory, if they are those of a run or batch of the user.
+
+        Raises:
+            RecordError: They cannot be read.
+        """
+        code = DirectoryCode(self.path, copied_plugins(self.path))
+        if code.is_own:
+            return code.files
+        self.notes.append(
+            f"the plugin code in {self.path} is not known to be yours, so it is not run: {code}; --plugin-path names files that are"
+        )
+        return ()
 
     @property
     def mission(self) -> Mission | None:

@@ -139,6 +139,17 @@ def test_log_period_thins_the_trajectory_and_changes_nothing(tussle, folder):
     assert steps[1] == {0.0, 1.0, 2.0, 3.0}
 
 
+def test_results_are_recorded_where_they_are_asked_for(tussle, folder):
+    tussle("run", "game.xml", "--out", "plain")
+    assert not (folder / "plain" / "results.arrow").exists()
+    tussle("run", "game.xml", "--out", "with", "--results")
+    run = load_run(folder / "with")
+    last = {row["team"]: row["value"] for row in run.results_table.to_pylist() if row["name"] == "score"}
+    assert {str(team): score for team, score in last.items()} == info_of(folder, "with")["worlds"][0][
+        "scores"
+    ]
+
+
 def test_shapes_are_recorded_where_they_are_asked_for(tussle, folder):
     (folder / "drawing.py").write_text(
         '"""Draws."""\n\nfrom tussle.stock import Predator\n\n\nclass Drawing(Predator):\n    """Draws where it is."""\n\n'

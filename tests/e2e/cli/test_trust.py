@@ -261,3 +261,54 @@ def test_looking_at_a_run_runs_nothing_of_it(here, ran, command):
 def test_trust_is_of_a_directory(here):
     assert here("run", "chance.xml", "--trust", *PLUGINS)[0] == 2
     assert trust.DirectoryCode(Path("x"), ()).is_own
+
+
+# -- run directories ------------------------------------------------------------------------------------------------------------
+
+RUN = ("run", "chance.xml", "--out", "kept", *PLUGINS)
+
+
+def test_a_run_keeps_the_plugins_with_which_it_is_shown_and_played_again(here):
+    assert here(*RUN)[0] == 0
+    Path("plugins.py").unlink()
+    code, err = here("run", "--from", "kept", "--no-log")
+    assert (code, "the end is that of the recording: the same state hash" in err) == (0, True)
+    for command in (("plot", "kept"), ("export", "kept", "--html")):
+        code, err = here(*command)
+        assert code == 0
+        assert "cannot be read" not in err
+    assert here("check", "kept")[0] == 0
+    code, err = here("run", "--from", "kept:1", "--no-log")
+    assert (code, "world 1 cannot be played again; it has worlds 0 to 0" in err) == (4, True)
+
+
+def test_a_run_whose_plugins_are_of_others_is_shown_without_them_and_played_only_when_trusted(here, ran):
+    assert here(*RUN)[0] == 0
+    Path("kept/plugins/0-plugins/plugins.py").write_text(evil(ran))
+    code, err = here("export", "kept", "--html")
+    assert (code, "not known to be yours, so it is not run" in err) == (0, True)
+    code, err = here("run", "--from", "kept", "--no-log")
+    assert (code, "--trust runs it" in err) == (4, True)
+    assert not ran.exists()
+    assert here("run", "--from", "kept", "--no-log", "--trust")[0] == 0
+    assert ran.exists()
+
+
+@pytest.mark.parametrize("name", ["plugins/0-plugins/plugins.py", "mission.xml"])
+def test_no_file_outside_of_a_run_directory_is_played(here, ran, tmp_path, name):
+    assert here(*RUN)[0] == 0
+    outside = tmp_path / f"outside{Path(name).suffix}"
+    outside.write_text(evil(ran) if name.endswith(".py") else Path("kept", name).read_text())
+    Path("kept", name).unlink()
+    Path("kept", name).symlink_to(outside)
+    code, err = here("run", "--from", "kept", "--no-log", "--trust")
+    assert code == 4
+    assert "out of the run directory" in err or "outside of the run directory" in err
+    assert not ran.exists()
+
+
+def test_a_run_that_was_killed_cannot_be_played_again(here):
+    assert here(*RUN)[0] == 0
+    Path("kept/run.json").unlink()
+    code, err = here("run", "--from", "kept", "--no-log")
+    assert (code, "it has no run.json, as it was killed or goes on" in err) == (4, True)

@@ -11,7 +11,7 @@ import pytest
 from missions import NAMES, mission
 from onlookers import pushed_flocks, radius_at, watched
 
-from tussle import Simulation
+from tussle import Recorder, Simulation, load_run
 from tussle.api import bodies
 from tussle.neighbors.index import next_size
 
@@ -89,3 +89,14 @@ def test_an_onlooker_far_away_changes_nothing(name):
             sim.step(STEPS)
             places.append(sim.read("west.pos")[0].tobytes() + sim.read("east.pos")[0].tobytes())
     assert places[0] == places[1]
+
+
+@pytest.mark.filterwarnings("ignore:not recorded, since no plugin")
+@pytest.mark.parametrize("name", GAMES)
+def test_recording_every_column_of_every_plugin_changes_nothing(name, tmp_path):
+    found = game(name)
+    with Simulation(found, seeds=[3, 4]) as sim, Simulation(found, seeds=[3, 4]) as plain:
+        with Recorder(sim, tmp_path / "run", columns="*"):
+            assert play(sim, STEPS) == play(plain, STEPS)
+        assert [sim.state_hash(w) for w in range(2)] == [plain.state_hash(w) for w in range(2)]
+    assert load_run(tmp_path / "run").columns

@@ -11,7 +11,6 @@ import pytest
 from tussle.aircraft.compile import CompiledAircraft, GeneratedKernel, compile_aircraft
 from tussle.aircraft.initial import place, run_initial
 from tussle.aircraft.node import MOST_NODES, AircraftError, read_text
-from tussle.stock.motion.jsbsim_compiled.flightgear import PROPERTIES
 
 DT = 1.0 / 120.0
 START = {
@@ -72,8 +71,7 @@ def both_flights(name, start, end, script, start_engines=True):
     for key, value in start.items():
         fdm[key] = value
     fdm.run_ic()
-    # With what a FlightGear is sent, so that test_flightgear.py need not compile another.
-    aircraft = compile_aircraft(None, name, (), PROPERTIES if name == "c172p" else ())
+    aircraft = compile_aircraft(None, name)
     x = aircraft.first[:, None].copy()
     single = [
         np.array([fdm[key]])
@@ -116,10 +114,12 @@ def test_a_light_aircraft_flies_in_wind_as_in_jsbsim():
     assert apart("c172p", {**START, "ic/h-sl-ft": 5000.0, "ic/vt-fps": 180.0}, 60.0, in_wind) < 1e-6
 
 
+@pytest.mark.slow
 def test_a_light_aircraft_rolls_along_the_runway_as_in_jsbsim():
     assert apart("c172p", GROUND, 12.0, roll_along) < 1e-3
 
 
+@pytest.mark.slow
 def test_a_take_off_from_standstill_is_that_of_jsbsim():
     far, fdm = both_flights("c172p", GROUND, 27.0, take_off)
     assert fdm["position/h-agl-ft"] > 50.0

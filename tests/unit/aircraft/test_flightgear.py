@@ -61,6 +61,7 @@ def controls(t):
             "fcs/rudder-cmd-norm": 0.05, "fcs/flap-cmd-norm": 0.3, "fcs/pitch-trim-cmd-norm": 0.02}  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("height", "speed"), [(5000.0, 180.0), (4.6, 0.0)])
 def test_packets_are_those_of_jsbsim(tmp_path, height, speed):
     jsbsim = pytest.importorskip("jsbsim")
@@ -116,6 +117,7 @@ def cessna(port: int) -> JSBSimCompiled:
     )
 
 
+@pytest.mark.slow
 def test_a_flightgear_receives_the_states_thirty_times_a_second():
     pytest.importorskip("jsbsim")
     with viewer() as (receiver, port):

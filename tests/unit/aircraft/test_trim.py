@@ -11,6 +11,8 @@ from tussle.api import Autonomy, Output
 from tussle.errors import ParameterError
 from tussle.stock import JSBSimCompiled
 
+pytestmark = pytest.mark.slow  # the aircraft takes the better part of a minute to compile
+
 SPEED, ALTITUDE = 50.0, 1500.0
 THROTTLE = 0.69
 
@@ -28,7 +30,6 @@ def cessna():
     return JSBSimCompiled(aircraft="c172p")
 
 
-@pytest.mark.slow
 def test_steady_flight_is_that_of_jsbsims_trim(cessna):
     import jsbsim
 

@@ -27,6 +27,7 @@ from tussle.api import (
 )
 from tussle.columns import Field
 from tussle.errors import DeclarationError, ParameterError, PluginError
+from tussle.numeric import total
 from tussle.stock import SingleIntegrator
 
 
@@ -157,7 +158,7 @@ class EasyEyes(EasyAutonomy):
             assert (
                 near[-1].distance
                 == me.distance(near[-1])
-                == math.sqrt(sum(v * v for v in near[-1].offset.tolist()))
+                == math.sqrt(total(v * v for v in near[-1].offset.tolist()))
             )
 
 
@@ -573,3 +574,37 @@ def test_plugins_are_values_in_easy_mode_too():
         _ = Steer().calls
     with pytest.raises(ParameterError, match="immutable"):
         Steer().most = 3.0
+
+
+def test_an_entity_is_found_by_its_id():
+    seen = []
+
+    def look(self, me):
+        other = me.entity(np.int32(2)) if me.id == 1 else None
+        if other is not None:
+            seen.append(
+                (other.id, other.team, other.distance, other == me.nearest(k=9)[-1] or other == me.nearest())
+            )
+            assert me.entity(2.0) == other
+            assert me.entity(0) is None
+
+    one_step(does(look)(), n=2)
+    assert [s[0] for s in seen] == [2]
+    assert seen[0][2] > 0.0
+    assert seen[0][3]
+
+
+@pytest.mark.parametrize(
+    ("number", "words"),
+    [
+        (99, "there has been no entity 99; the largest id so far is 4"),
+        (-1, "-1 is no id"),
+        (1.5, "1.5 is no id"),
+        (math.nan, "nan is no id"),
+        ("2", "'2' is no id"),
+    ],
+)
+def test_an_id_that_nobody_had_is_an_error(number, words):
+    message = failing(lambda self, me: me.entity(number))
+    assert "me.entity" in message
+    assert words in message

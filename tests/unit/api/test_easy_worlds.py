@@ -45,6 +45,38 @@ def failing(function, **columns):
     return str(caught.value)
 
 
+def test_a_kill_says_whether_it_is_new():
+    seen = []
+
+    def kills(self, w):
+        first, second, third, _ = w.entities
+        seen.append([w.kill(first, "a"), w.kill(first, "b"), w.kill(second, "a"), third.id])
+
+    def masks(self, w):
+        seen.append(w.kill([2, 2, 3], "by row").tolist())
+        seen.append(w.kill(w.id >= 2, "by mask").tolist())
+        seen.append(w.kill([], "nobody").tolist())
+
+    rows = type("Rows", (Interaction,), {"step": masks, "__module__": __name__})
+    sim = played(referee(kills)(), rows())
+    assert seen == [[True, False, True, 3], [True, False, True], [False, False, False, False], []]
+    assert sim.result()[0].alive == {1: 0, 2: 0}
+
+
+def test_an_entity_that_is_gone_is_none_and_one_that_never_was_is_an_error():
+    found = []
+
+    def look(self, w):
+        found.append(w.entity(4))
+        w.kill(w.entities[-1], "last")
+
+    played(referee(look)(), steps=2)
+    assert found[0].id == 4
+    assert found[1] is None
+    assert "there has been no entity 9; the largest id so far is 4" in failing(lambda self, w: w.entity(9))
+    assert "'x' is no id" in failing(lambda self, w: w.entity("x"))
+
+
 # -- what there is ----------------------------------------------------------------------------------------------------------------
 
 
@@ -61,7 +93,7 @@ def test_a_world_is_plain_values():
             w.harm,
             entities,
             w.entity(3).id,
-            w.entity(9),
+            w.entity(0),
             repr(w),
         )
 

@@ -287,6 +287,7 @@ def test_a_state_in_json_is_in_north_east_down_and_forward_right_down():
     assert first["quaternion"] == pytest.approx(
         [math.cos(0.5 * yaw), 0.0, 0.0, math.sin(0.5 * yaw)], abs=1e-12
     )
+    assert first["attitude"] == pytest.approx([0.0, 0.0, yaw])
     assert first["imu"] == {
         "gyro": pytest.approx([0.0] * 3),
         "accel_body": pytest.approx([0.0, 0.0, -9.80665]),
@@ -576,6 +577,57 @@ def test_frames_that_count_from_one_again_are_told():
         threading.Thread(target=restart, daemon=True).start()
         with pytest.raises(PluginError, match="it has started anew: its frame 1 came after 504"):
             sim.step()
+
+
+def test_an_autopilot_that_is_started_again_finds_its_vehicle_where_it_began():
+    """A process is killed on the way, and another one at another port of its own flies the vehicle of two from the start on."""
+    port = free_ports(2, step=10)
+    block = {"variance": (100.0, 100.0, 0.0), "velocity": (0.0, 0.0, 1.0)}
+    mission = copter(port, count=2, block=block, on_restart="reset", end=LONG)
+    again = ("ardupilot_peer.py", "json", port, 20, "--patience", LONG)
+    with JsonServant(port + 10), Simulation(mission) as sim:
+        start = sim.read("copter.pos")[0]
+        with Process(*again):
+            sim.step(300)
+        assert sim.read("copter.pos")[0][0, 0, 2] > start[0, 0, 2] + 1.0
+        with Process(*again):
+            while not sim.read("copter.ArduPilot.restarts")[0].any():
+                sim.step()
+            assert sim.read("copter.ArduPilot.restarts")[0].tolist() == [[1, 0]]
+            moved = sim.read("copter.pos")[0][0, 0] - start[0, 0]
+            assert np.abs(moved).max() < 0.05  # it has moved for one step
+            sim.step(1000)
+            climb = sim.read("copter.pos")[0][0, 0, 2] - start[0, 0, 2]
+            assert climb == pytest.approx(20.0, abs=1.0)
+            assert sim.read("copter.ArduPilot.restarts")[0].tolist() == [[1, 0]]
+
+
+def test_two_autopilots_at_a_port_are_told_also_where_one_may_start_again():
+    port = free_ports()
+    with JsonServant(port, first=500), Simulation(copter(port, on_restart="reset")) as sim:
+        sim.step(5)
+        with (
+            Noise(port, packets=(JsonServant.frame(7, [1100] * 16),)),
+            pytest.raises(PluginError, match="a second autopilot, at"),
+        ):
+            sim.run()
+
+
+def test_by_the_protocol_of_scrimmage_a_restart_is_a_packet_from_another_port():
+    port = free_ports(2)
+    mission = by_scrimmage(port, on_restart="reset", timeout=20.0, resend_period=0.1, end=LONG)
+    with Simulation(mission) as sim:
+        start = sim.read("copter.pos")[0][0, 0]
+        with servant_at("scrimmage", port):
+            sim.step(50)
+        assert abs(sim.read("copter.pos")[0][0, 0, 2] - start[2]) > 0.1
+        packet = struct.pack("<16H", *[1500] * 16)
+        with Noise(port, packets=(packet,)):
+            while not sim.read("copter.ArduPilot.restarts")[0].any():
+                sim.step()
+            assert np.abs(sim.read("copter.pos")[0][0, 0] - start).max() < 0.05
+            sim.step(20)
+        assert sim.read("copter.ArduPilot.restarts")[0].tolist() == [[1]]
 
 
 @pytest.mark.parametrize("protocol", ["json", "scrimmage"])

@@ -21,6 +21,7 @@ from tussle import Block, Mission, Simulation
 from tussle.errors import MissingExtraError, ParameterError, PluginError
 from tussle.scene import Scene
 from tussle.stock import PX4, DirectController, Multirotor
+from tussle.stock.autonomy.px4.link import Px4Link
 
 pytest.importorskip("pymavlink")
 PEER_OF_EXAMPLES = example("px4_peer")
@@ -55,6 +56,15 @@ def controls(time_us, values=(0.5,) * 16, flags=1):
     return packet(HIL_CONTROLS, 0, CONTROLS.pack(time_us, flags, *values, 129))
 
 
+def senders(received):
+    """System and component of each complete message of MAVLink 2 in some bytes."""
+    found, begin = set(), 0
+    while len(received) >= begin + 12 and len(received) >= begin + 12 + received[begin + 1]:
+        found.add((received[begin + 5], received[begin + 6]))
+        begin += 12 + received[begin + 1]
+    return found
+
+
 class Px4Servant(Thread):
     """Answers each HIL_SENSOR.
 
@@ -66,7 +76,7 @@ class Px4Servant(Thread):
 
     def __init__(self, port, act=lambda n, time_us: controls(time_us), hello=b""):
         self.port, self.act, self.hello = port, act, hello
-        self.messages, self.n = [], 0
+        self.messages, self.n, self.systems = [], 0, set()
         self.socket = None
 
     def run(self):
@@ -83,6 +93,7 @@ class Px4Servant(Thread):
                     if not data:
                         break
                     received += data
+                    self.systems |= senders(received)
                     for message in take_messages(received):
                         self.take(*message)
 
@@ -251,6 +262,60 @@ def test_an_answer_to_older_measurements_is_none():
             sim.step()
             assert px4.n == k + 2
             assert sim.read("copter.PX4.motor_0_out")[0].item() == 300.0
+
+
+@pytest.mark.parametrize("phase", [0, 1, 2])
+def test_a_px4_that_answers_each_third_message_flies_and_the_steps_without_an_answer_are_counted(
+    phase, monkeypatch
+):
+    """As one whose controllers are slower than the measurements come: at first the steps wait, then only each third one."""
+    port = tcp_port()
+
+    def act(n, time_us):
+        return controls(time_us, ((n % 50) / 100.0,) * 16) if n == 0 or n % 3 == phase else None
+
+    mission = copter(port, dt=0.002, end=LONG, patience=0.2)
+    with Px4Servant(port, act=act), Simulation(mission) as sim:
+        with pytest.warns(
+            RuntimeWarning, match=r"no HIL_ACTUATOR_CONTROLS within 0\.2 s for the measurements of t = "
+        ):
+            sim.step(9)
+        got = []
+        # It does not wait any more for what does not come.
+        monkeypatch.setattr(Px4Link, "_go_on", lambda self: self.fail("a step has waited"))
+        for _ in range(300):
+            sim.step()
+            got.append(sim.read("copter.PX4.motor_0_out")[0].item())
+        assert sim.read("copter.PX4.unanswered")[0].item() == pytest.approx(309 * 2 / 3, abs=3)
+        # In each step the newest controls hold: those for one of the last three measurements.
+        assert len(set(got)) > 10
+        assert max(abs(a - b) for a, b in itertools.pairwise(got) if a < b) == pytest.approx(12.0 * 3)
+
+
+def test_controls_of_a_px4_that_is_late_are_not_lost():
+    """Its first answers come when the next measurements have been sent."""
+    port = tcp_port()
+
+    def act(n, time_us):
+        time.sleep(0.3 if n == 3 else 0.0)
+        return controls(time_us, ((n + 1) / 100.0,) * 16)
+
+    with Px4Servant(port, act=act) as px4, Simulation(copter(port, patience=0.1)) as sim:
+        with pytest.warns(RuntimeWarning, match="`unanswered` counts them"):
+            sim.step(10)
+        assert 1 <= sim.read("copter.PX4.unanswered")[0].item() <= 4
+        sim.step(5)
+        assert sim.read("copter.PX4.motor_0_out")[0].item() == pytest.approx(12.0 * px4.n)
+
+
+@pytest.mark.parametrize(("given", "system"), [({}, 1), ({"system_id": 7}, 7)])
+def test_messages_are_of_a_system_and_the_sensors_come_first_in_a_step(given, system):
+    port = tcp_port()
+    with Px4Servant(port) as px4, Simulation(copter(port, gps_rate=250.0, **given)) as sim:
+        sim.step(3)
+    steps = [number for number, _ in px4.messages]
+    assert steps == [HIL_SENSOR, HIL_STATE, HIL_GPS] * 4
+    assert px4.systems == {(system, 1)}
 
 
 def test_a_px4_that_is_slower_than_its_measurements_come_starts():

@@ -87,8 +87,8 @@ def _finished(
     failed: Mapping[int, str],
 ) -> Finished:
     counts = alive.get(run, [(1, 0.0, 50), (1, 30.0, 17), (1, 100.0, 17), *_unchanged()])
-    left = {team: n for team, _, n in counts}
-    found: list[tuple[int | None, str, float]] = [(team, "start", float(START[team])) for team in left]
+    left, first = {team: n for team, _, n in counts}, {team: n for team, _, n in reversed(counts)}
+    found: list[tuple[int | None, str, float]] = [(team, "start", float(n)) for team, n in first.items()]
     found += [(team, "alive", float(n)) for team, n in left.items()]
     found += [(team, "score", float(values[run])) for team, values in scores.items()]
     for name, of in metrics.items():

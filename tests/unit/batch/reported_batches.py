@@ -6,6 +6,7 @@ import numpy as np
 from made_batches import made_batch
 
 from tussle.batch.report import sections_of
+from tussle.batch.report.answers import answers
 from tussle.batch.report.report_data import ReportData
 from tussle.batch.report.sections import answer, notes
 from tussle.batch.results import Results
@@ -59,7 +60,8 @@ def texts_of(stored, more=()) -> str:
         parts += [f"{name} {value}" for name, value in section.facts]
         for table in section.tables:
             parts += [table.title, *(" ".join(row) for row in table.rows), table.caption]
-    return "\n".join([answer(data), *notes(data), *parts]).replace("\u00a0", " ")
+    asked = [f"{each.question} {each.text}" for each in answers(data)]
+    return "\n".join([answer(data), *asked, *notes(data), *parts]).replace("\u00a0", " ")
 
 
 def names_of(stored, more=()) -> set[str]:

@@ -9,7 +9,7 @@ import pytest
 from made_batches import made_batch, write_batch
 
 from tussle.batch import Batch, Choice, InProcess, load_batch
-from tussle.batch.analysis import analyse, leading
+from tussle.batch.analysis import analyse
 from tussle.batch.results import Results
 from tussle.batch.search.optimization import Optimization
 from tussle.errors import MissionError
@@ -103,9 +103,8 @@ def test_without_scores_what_is_measured_comes_first_and_nobody_wins():
     results = Results(
         made_batch({}, metrics={"Cap.hits": {None: hits}, "Cap.same": {None: hits * 0.0}}, **COUNTS)
     )
-    assert results.measured == leading(results) == ["Cap.hits"]
-    assert results.usual[0] == "Cap.hits"
-    alive = [name for name in results.usual if name.startswith("alive")]
+    assert results.defaults.leading == ["Cap.hits"]
+    alive = [name for name in results.defaults.all if name.startswith("alive")]
     assert alive == ["alive[1]"], "nobody died of the others"
     assert results.shares() == []
 
@@ -113,7 +112,7 @@ def test_without_scores_what_is_measured_comes_first_and_nobody_wins():
 def test_one_team_with_a_score_cannot_win():
     results = Results(made_batch({1: np.arange(12.0).reshape(4, 3)}, **COUNTS))
     assert results.shares() == []
-    assert results.usual[0] == "score[1]"
+    assert results.defaults.leading[0] == "score[1]"
 
 
 def test_intervals_over_points_have_none_of_their_differences():

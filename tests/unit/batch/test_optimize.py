@@ -182,6 +182,57 @@ def test_values_that_can_never_be_played_are_an_error(game):
         search(source=game, vary=["x=150:160"], plugin_files=[PLUGIN])
 
 
+# -- constraints -------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("sampler", ["tpe", "random"])
+def test_the_best_keeps_the_constraints(sampler):
+    # Without them it is x = 3; so it is as near to it as they allow.
+    study = search(
+        sampler=sampler,
+        vary={"Bowl.x": (0.0, 10.0)},
+        subject_to=["Bowl.log < 2", "Bowl.height >= 0"],
+        trials=48,
+    )
+    assert study.best.values["Bowl.x"] == pytest.approx(2.0, abs=0.4)
+    assert study.best.values["Bowl.x"] <= 2.0
+    assert study.constrained(study.best) == pytest.approx(
+        {"Bowl.log": study.best.values["Bowl.x"], "Bowl.height": study.best.objective}
+    )
+    assert any(
+        t.is_complete and not t.is_feasible and t.objective > study.best.objective for t in study.trials
+    )
+    assert all(t.is_feasible for t in (*study.ranking, *study.improvements))
+    # The sampler knows of them: after its first random trials most are allowed.
+    allowed = [t.values["Bowl.x"] <= 2.0 for t in study.trials[16:]]
+    assert sampler == "random" or np.mean(allowed) > 0.5
+
+
+def test_constraints_that_no_trial_keeps_are_told_with_the_nearest():
+    study = search(vary={"Bowl.x": (1.0, 10.0)}, subject_to=["Bowl.log < 0.5"], trials=16)
+    assert (study.best, study.ranking, study.lead, study.improvements) == (None, [], None, [])
+    assert study.nearest.values["Bowl.x"] == min(t.values["Bowl.x"] for t in study.trials)
+
+
+def test_a_game_without_the_constrained_value_fails():
+    study = search(vary={"Bowl.x": (-10.0, 10.0)}, subject_to=["Bowl.log < 5"], trials=16)
+    failed = [t for t in study.trials if not t.is_complete]
+    assert failed
+    assert all(t.values["Bowl.x"] < 0.0 for t in failed)
+    assert "Bowl.log has no value" in failed[0].error
+
+
+def test_a_search_with_constraints_goes_on_and_is_another_one_than_without(tmp_path):
+    more = {"subject_to": ["Bowl.log <= 2"], "vary": {"Bowl.x": (-1.0, 10.0)}}
+    whole = search(trials=24, **more)
+    for trials in (8, 13, 24):
+        study = search(trials=trials, directory=tmp_path / "out", **more)
+    assert facts(study) == facts(whole) == facts(load_study(tmp_path / "out"))
+    assert [str(c) for c in load_study(tmp_path / "out").constraints] == ["Bowl.log <= 2.0"]
+    with pytest.raises(BatchError, match="it differs in constraints"):
+        search(trials=24, directory=tmp_path / "out", vary=more["vary"])
+
+
 # -- what is refused ------------------------------------------------------------------------------------------------------
 
 
@@ -200,6 +251,9 @@ def test_values_that_can_never_be_played_are_an_error(game):
         ({"vary": {"Bowl.x": [1, "1", "a"]}}, "Bowl.x"),
         ({"objective": "Bowl.hight"}, "did you mean 'Bowl.height'"),
         ({"objective": "Bowl.height["}, "cannot be read"),
+        ({"subject_to": ["Bowl.hight < 1"]}, "did you mean 'Bowl.height'"),
+        ({"subject_to": ["Bowl.height"]}, "subject_to 'Bowl.height': there is no sign"),
+        ({"subject_to": ["Bowl.height < 1"], "sampler": "cmaes"}, "cmaes knows no constraints"),
         ({"vary": {"Bowl.z": (0.0, 1.0)}}, "Bowl.z"),
     ],
 )
@@ -302,7 +356,7 @@ def test_what_the_directory_holds(tmp_path, game):
     assert (info["objective"], info["direction"]) == ("Bowl.height", "maximize")
     assert info["mission"]["file"] == "bowl.xml"
     table = pq.read_table(tmp_path / "out" / "trials.parquet")
-    facts = ("objective", "low", "high", "n_failed", "state", "error", "by_seed")
+    facts = ("objective", "low", "high", "n_failed", "state", "error", "by_seed", "violations")
     assert table.column_names == ["trial", "round", "x", "n", "luck", *facts]
     assert table["trial"].to_pylist() == list(range(20))
     assert table["round"].to_pylist() == [0] * 8 + [1] * 8 + [2] * 4

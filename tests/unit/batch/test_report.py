@@ -208,7 +208,7 @@ def test_the_same_batch_gives_the_same_bytes_whatever_the_user_has_set(of_choice
 # -- that it stays small, and what it cannot do ------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("package", ["matplotlib", "jinja2", "statsmodels.regression.linear_model"])
+@pytest.mark.parametrize("package", ["matplotlib", "jinja2"])
 def test_without_a_package_the_extra_is_named(monkeypatch, tmp_path, package):
     monkeypatch.setitem(sys.modules, package, None)
     with pytest.raises(MissingExtraError, match=rf"{package.partition('.')[0]}.*tussle\[batch\]"):

@@ -181,7 +181,7 @@ def test_games_without_scores_have_no_winners():
     results = Results(made_batch({}, metrics={"Cap.hits": {None: np.ones((3, 1))}}))
     assert results.shares() == []
     assert not {"ties", "wins[1]"} & set(results.quantities)
-    assert results.usual == ["Cap.hits", "alive[1]"]
+    assert results.defaults.all == ["Cap.hits", "alive[1]"]
 
 
 def test_means_are_those_of_the_runs(grid):

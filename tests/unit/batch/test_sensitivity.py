@@ -8,11 +8,10 @@ import sys
 import numpy as np
 import pytest
 from made_batches import made_batch
-from scipy.stats import spearmanr
 
 from tussle.batch.results import Results
 from tussle.batch.sampling import sample
-from tussle.batch.sensitivity import FROM_POINTS, as_factorial, spearman
+from tussle.batch.sensitivity import as_factorial, spearman
 from tussle.batch.variables import Choice, Range
 from tussle.errors import MissingExtraError
 
@@ -68,38 +67,43 @@ def test_rows_that_lack_a_run_are_left_out_and_told(saltelli_points):
 # -- any sample -----------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("method", ["lhs", "sobol"])
-def test_first_order_indices_come_of_points_sampled_otherwise(method):
-    points = sample(ISHIGAMI, method, 1024, seed=2)
+@pytest.mark.parametrize(("method", "n"), [("lhs", 100), ("sobol", 128)])
+def test_parts_come_of_points_sampled_otherwise(method, n):
+    points = sample(ISHIGAMI, method, n, seed=2)
     found = results_of(ishigami(points), variables=ISHIGAMI, points=points, sample=method).sensitivity(
         "score[2]"
     )
-    for e, first in zip(found, FIRST, strict=True):
-        assert (e.method, e.total) == ("rbd_fast", None)
+    assert [e.variable for e in found] == ["a", "b", "c", "unexplained"]
+    for e, first, total in zip(found, FIRST, TOTAL, strict=False):
+        assert e.method == "fit"
         assert e.first_order == pytest.approx(first, abs=0.08)
+        assert e.total == pytest.approx(total, abs=0.1)
         assert e.first_low < e.first_order < e.first_high
 
 
-def test_a_choice_among_ranges_has_the_part_between_its_values():
+@pytest.mark.parametrize("n", [24, 100])
+def test_a_choice_among_ranges_has_its_part_with_few_points_too(n):
     variables = [Range("x", 0.0, 1.0), Choice("tactic", ("keep", "switch", "rest"))]
-    points = sample(variables, "lhs", 600, seed=3)
+    points = sample(variables, "lhs", n, seed=3)
     add = {"keep": -1.0, "switch": 1.0, "rest": 0.0}
-    scores = np.array([p["x"] * math.sqrt(12.0) + add[p["tactic"]] for p in points])  # variances 1 and 2/3
+    means = np.array([p["x"] * math.sqrt(12.0) + add[p["tactic"]] for p in points])  # variances 1 and 2/3
+    scores = means + np.random.default_rng(1).normal(0.0, 1.0, (10, n))  # and 1
     found = results_of(scores, variables=variables, points=points, sample="lhs").sensitivity("score[2]")
-    assert [e.method for e in found] == ["rbd_fast", "levels"]
-    assert [e.first_order for e in found] == pytest.approx([0.6, 0.4], abs=0.04)
-    assert found[1].first_low < 0.4 < found[1].first_high
+    assert [e.method for e in found] == ["fit", "fit", "fit"]
+    assert [e.variable for e in found] == ["x", "tactic", "seed"]
+    assert [e.first_order for e in found] == pytest.approx([3 / 8, 2 / 8, 3 / 8], abs=0.08)
+    assert found[1].total >= found[1].first_order
     assert math.isnan(found[1].rank_correlation)
     assert "tactic has no order" in found[1].note
 
 
 def test_few_points_have_no_parts_and_the_note_says_so():
-    points = sample(ISHIGAMI, "lhs", FROM_POINTS - 1, seed=1)
+    points = sample(ISHIGAMI, "lhs", 11, seed=1)
     found = results_of(ishigami(points), variables=ISHIGAMI, points=points, sample="lhs").sensitivity(
         "score[2]"
     )
     assert all(e.first_order is None and e.method == "" for e in found)
-    assert f"they take {FROM_POINTS} points" in found[0].note
+    assert "they take 12 points" in found[0].note
 
 
 # -- factorial ------------------------------------------------------------------------------------------------------------
@@ -159,6 +163,8 @@ def test_points_are_a_factorial_in_any_order_or_none():
 
 
 def test_the_rank_correlation_is_that_of_the_points_means():
+    from scipy.stats import spearmanr
+
     points = sample(ISHIGAMI, "lhs", 40, seed=7)
     scores = ishigami(points) + np.random.default_rng(8).normal(size=(5, 40))
     found = results_of(scores, variables=ISHIGAMI, points=points, sample="lhs").sensitivity("score[2]")
@@ -206,10 +212,8 @@ def test_only_what_needs_salib_misses_it(saltelli_points):
     with pytest.raises(MissingExtraError, match=r"need SALib, .* pip install 'tussle\[batch\]'"):
         results.sensitivity("score[2]")
     assert results.rank_correlations("score[2]")[0].rank_correlation > 0.3
-    points = sample(ISHIGAMI, "lhs", 100, seed=2)
+    points = sample(ISHIGAMI, "lhs", 20, seed=2)
     found = results_of(ishigami(points), variables=ISHIGAMI, points=points, sample="lhs").sensitivity(
         "score[2]"
     )
-    assert math.isfinite(found[0].rank_correlation)
-    assert found[0].first_order is None
-    assert "pip install 'tussle[batch]'" in found[0].note
+    assert found[0].first_order is not None

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy.stats import bootstrap
 
 from tussle.batch import statistics
 from tussle.batch.statistics import (
@@ -72,6 +71,8 @@ def test_the_running_result_is_one_line():
 
 
 def test_a_mean_has_the_bca_interval_of_scipy():
+    from scipy.stats import bootstrap
+
     values = np.random.default_rng(3).exponential(size=60)
     expected = bootstrap(
         (values,),

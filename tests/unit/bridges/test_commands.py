@@ -82,7 +82,8 @@ def test_commands_reach_the_entities_that_they_are_for(game, send):
 def test_commands_that_nobody_hears_are_told_so(game, send):
     with Simulation(game) as sim:
         answers = send(
-            ("GlobalNetwork", "Evnt", "go"), ("Nowhere", "/1/Event", "go"), ("GlobalNetwork", "", ""), ("GlobalNetwork", "/9/Event", "go")
+            ("GlobalNetwork", "Evnt", "go"), ("Nowhere", "/1/Event", "go"), ("GlobalNetwork", "", ""), ("GlobalNetwork", "/9/Event", "go"),
+            ("GlobalNetwork", "/0/Event", "go"), ("GlobalNetwork", "/2/Event", "x"),
         )  # fmt: skip
         sim.step(5)
         assert sim.read("a.GraphvizFSM.node")[0].tolist() == [[0, 0]]
@@ -91,7 +92,21 @@ def test_commands_that_nobody_hears_are_told_so(game, send):
     )
     assert answers[1].startswith("INVALID_ARGUMENT")
     assert answers[2].startswith("INVALID_ARGUMENT")
-    assert answers[3] == "1"  # it is no error that an entity is gone
+    for answer, topic, number in ((answers[3], "/9/Event", 9), (answers[4], "/0/Event", 0)):
+        assert (
+            answer == f"INVALID_ARGUMENT topic '{topic}': no entity has had the id {number}; ids are 1 to 2"
+        )
+    assert answers[5] == "1"
+
+
+def test_it_is_no_error_that_an_entity_is_gone(game, send):
+    with Simulation(game) as sim:
+        sim.write("a.health", [[1.0, 0.0]])
+        sim.step(2)
+        assert sim.state.population.bodies.id.tolist() == [1]
+        assert send(("GlobalNetwork", "/2/Event", "go")) == ["1"]
+        sim.step(2)
+        assert sim.read("a.GraphvizFSM.node")[0][0, 0] == 0
 
 
 def test_more_commands_than_a_step_takes_are_refused(game, send, monkeypatch):

@@ -206,6 +206,31 @@ def test_an_entity_that_is_gone_is_said_to_be(peer):
     assert [(each["id"][2], each["appearance"]) for each in got] == [(1, 0), (2, 0), (2, DEACTIVATED)]
 
 
+@pytest.mark.parametrize("heading", [0.0, 2.0])
+def test_a_removal_has_the_place_of_its_time(peer, heading):
+    """An entity that flies a circle at constant speed, or straight on, and is not sent before the removal."""
+    flyer = Block(
+        name="scout", team=1, motion=External(), position=(0.0, 0.0, 90.0), heading=f"{heading} rad"
+    )
+    way = np.array([math.cos(heading), math.sin(heading), 0.0])
+    with Simulation(mission(flyer, port=peer.port, heartbeat=60.0, position_threshold=1.0)) as sim:
+        sim.write("scout.vel", (89.0 * way)[None, None])
+        sim.step()
+        dt = sim.mission.dt
+        for k in range(1, 11):
+            sim.write("scout.pos", (np.array([0.0, 0.0, 90.0]) + 89.0 * dt * k * way)[None, None])
+            sim.write("scout.vel", (89.0 * way)[None, None])
+            sim.step()
+        last = sim.read("scout.pos")[0][0, 0]
+        sim.write("scout.health", np.array([[0.0]]))
+        sim.step(2)
+        *_, gone = peer.ask(receive=sim.state.context.shared[DIS, "DIS"].n_sent)
+    assert gone["appearance"] == DEACTIVATED
+    latitude, longitude, altitude = gone["llarpy"][:3]
+    there = ORIGIN.from_geodetic(np.array([latitude, longitude, altitude]))
+    assert np.linalg.norm(there - (last + 2 * 89.0 * dt * way)) < 89.0 * dt + 1.0
+
+
 def test_more_entities_than_dis_has_numbers_for_are_refused():
     many = Block(name="m", team=1, count=65534, motion=External())
     with (
@@ -312,14 +337,21 @@ def test_dead_reckoning_is_the_integral_of_what_is_sent(algorithm):
     reached = pdu.extrapolate(np.array([algorithm]), pos, vel, acceleration, quat, omega, np.array([t]))
     moves, turns = 2 <= algorithm <= 9, algorithm in (3, 4, 7, 8)
     gains, is_body = algorithm in (4, 5, 8, 9), algorithm in (6, 7, 8, 9)
-    # The motion as the standard defines it, by 20,000 small steps of the middle.
-    x, q, h = pos.copy(), quat, t / 20_000
-    for k in range(20_000 if moves else 0):
-        v = vel + acceleration * (k + 0.5) * h * gains
-        step = quat_normalize(np.concatenate([np.ones((1, 1)), omega * h / 4 * turns]))
-        middle = pdu.quat_multiply(q, step)
-        x = x + h * (pdu.quat_rotate(middle, v) if is_body else v)
-        q = pdu.quat_multiply(middle, step)
+
+    def flown(n):
+        """The motion as the standard defines it, by n steps of the middle."""
+        x, q, h = pos.copy(), quat, t / n
+        for k in range(n if moves else 0):
+            v = vel + acceleration * (k + 0.5) * h * gains
+            step = quat_normalize(np.concatenate([np.ones((1, 1)), omega * h / 4 * turns]))
+            middle = pdu.quat_multiply(q, step)
+            x = x + h * (pdu.quat_rotate(middle, v) if is_body else v)
+            q = pdu.quat_multiply(middle, step)
+        return np.concatenate([x, q])
+
+    x, q = np.split(
+        (4.0 * flown(800) - flown(400)) / 3.0, [3]
+    )  # the error of the middle is one of second order
     np.testing.assert_allclose(reached[0], x, atol=1e-6)
     np.testing.assert_allclose(reached[2], q, atol=1e-6)
     v = (vel + acceleration * t * gains) * moves

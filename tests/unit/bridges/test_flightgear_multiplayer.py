@@ -125,6 +125,24 @@ def test_blocks_with_one_callsign_have_different_ones(flightgear):
     assert [got["callsign"] for got in wait()] == ["syllo", "syllo2", "syllo3", "syllo4"] * 2
 
 
+def test_callsigns_of_blocks_are_different_also_when_they_are_cut(flightgear):
+    port, wait = flightgear(46)
+    names = ["eagle1", "eagle12", "eagles", "eagles5", "eaglesx"]
+    counts = [24, 6, 6, 1, 9]
+    blocks = [
+        mission(n, server_port=port, callsign=callsign).blocks[0].replace(name=callsign)
+        for callsign, n in zip(names, counts, strict=True)
+    ]
+    with Simulation(mission().replace(blocks=blocks)) as sim:
+        sim.step()
+        first = [got["callsign"] for got in wait()]
+    assert len(set(first)) == 46
+    assert all(0 < len(each) <= 7 for each in first)
+    assert first[0] == "eagle1"
+    assert first[1] == "eagle12"  # the second entity of the first block
+    assert first[24] != "eagle12"
+
+
 def test_the_example_is_played(flightgear, tmp_path):
     port, wait = flightgear(20)
     path = tmp_path / "mission.xml"

@@ -157,3 +157,30 @@ def test_the_stub_of_an_aircraft_moves_at_fixed_times():
     assert {t: v for t, v in heard.items() if any(v)} == {
         2.0: [0, 0, 0, -0.26], 2.5: [0, 0, 0, 0.26], 8.0: [0, 0, -0.5, 0], 8.5: [0, 0, 0.5, 0],
     }  # fmt: skip
+
+
+def test_aircraft_of_jsbsim_turn_by_compass_headings():
+    turn = law("JSBSimModelControllerHeadingPID", "turn")
+    gains, bank = (1.0, 0.5, 0.0, 0.1), math.pi / 4
+    # From East to 0.05 rad to the left: the compass heading decreases, the left wing goes down.
+    roll, altitude, speed, memory, desired = turn(0.05, 300.0, 20.0, 0.0, gains, bank, NEW, 0.0, 0.1)
+    assert (roll, altitude, speed) == pytest.approx((-0.05 - 0.5 * 0.005, 300.0, 20.0))
+    assert (memory, desired) == (pytest.approx((-0.005, -0.05, 1.0)), pytest.approx(math.pi / 2 - 0.05))
+    # A reversal is filtered: the desired heading moves by 0.75 dt of the change.
+    roll, *_, desired = turn(
+        -math.pi / 2 - 0.2, 0.0, 0.0, math.pi / 2, gains, bank, (0.0, 0.0, 1.0), 0.0, 0.1
+    )
+    assert desired == pytest.approx(0.075 * (0.2 - math.pi))
+    assert roll == pytest.approx(desired)
+    # In the first call nothing is filtered.
+    assert turn(-math.pi / 2, 0.0, 0.0, math.pi / 2, gains, bank, NEW, 0.0, 0.1)[-1] == pytest.approx(math.pi)
+
+
+def test_surfaces_of_jsbsim_have_scrimmages_signs():
+    hold = law("JSBSimControlControllerHeadingPID", "hold")
+    plain = (2.0, 0.0, 0.0, 1.0)
+    throttle, elevator, aileron, rudder, *_ = hold(
+        0.0, 0.3, 0.1, 0.2, plain, plain, plain, 0.75, NEW, NEW, NEW, 0.1
+    )
+    assert (throttle, elevator, aileron) == pytest.approx((0.0, -0.4, -0.2))
+    assert rudder == pytest.approx(-2.0 * (math.pi / 2 - 0.3))  # East is 90 degrees of the compass

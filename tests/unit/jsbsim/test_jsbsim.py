@@ -72,7 +72,7 @@ def test_a_flight_is_that_of_jsbsim():
     fdm.set_dt(1 / 120)
     fdm.load_model("c172p")
     values, origin = placing
-    place, motion = values[:6], values[6:]
+    place, motion, wind = values[:6], values[6:12], values[12:15]
     fdm["ic/terrain-elevation-ft"] = 100.0 / FOOT
     names = "lat-geod-rad long-gc-rad h-sl-ft phi-rad theta-rad psi-true-rad vn-fps ve-fps vd-fps"
     for name, value in zip(names.split(), [*place, *motion[:3]], strict=True):
@@ -81,9 +81,7 @@ def test_a_flight_is_that_of_jsbsim():
     latitude, _, altitude = origin.to_geodetic(np.array([1000.0, 2000.0, 1500.0]))
     assert fdm["position/lat-geod-rad"] == pytest.approx(latitude, abs=1e-14)
     assert FOOT * fdm["position/geod-alt-ft"] == pytest.approx(altitude, abs=1e-7)
-    fdm["atmosphere/wind-north-fps"], fdm["atmosphere/wind-east-fps"], fdm["atmosphere/wind-down-fps"] = (
-        motion[6:]
-    )
+    fdm["atmosphere/wind-north-fps"], fdm["atmosphere/wind-east-fps"], fdm["atmosphere/wind-down-fps"] = wind
     fdm["propulsion/set-running"] = -1
     fdm.do_trim(0)
     for k in range(1200):

@@ -119,7 +119,7 @@ def test_a_community_is_told_where_all_are_in_its_units_and_frames(database):
     first = {key: values[0] for key in ("NAV_X", "NAV_Y", "NAV_HEADING", "NAV_SPEED", "NAV_DEPTH", "DEPLOY", "RETURN",
              "MOOS_MANUAL_OVERRIDE", "NODE_REPORT_LOCAL", "NODE_REPORT") if (values := database.read_values(key))}  # fmt: skip
     assert first.pop("NODE_REPORT") == (
-        "NAME=2,X=10.000,Y=20.000,SPD=0.000,HDG=270.000,DEP=3.000,TYPE=KAYAK,GROUP=2,MODE=none,TIME=0.000"
+        "NAME=2,X=10.000,Y=20.000,SPD=0.000,HDG=270.000,DEP=3.000,TYPE=KAYAK,GROUP=team_2,MODE=none,TIME=0.000"
     )
     assert first.pop("NODE_REPORT_LOCAL").startswith("NAME=1,X=0.000,Y=0.000,SPD=0.000,HDG=0.000,DEP=0.000,")
     assert first.pop("NAV_HEADING") == pytest.approx(0.0, abs=1e-9)
@@ -441,6 +441,97 @@ def test_a_database_that_dies_on_the_way_is_missed(database):
                 database.drop(client)
 
     ends(database, kill, "(the connection was closed|Connection reset by peer|nothing can be sent: .*)")
+
+
+def restarted(sim, first):
+    """Another MOOSDB and helm at the place of the first, which has ended."""
+    first.close()
+    assert first.violations == []
+    link = sim.state.population.groups[0].autonomies[0].plugin.vessel[0]
+    while not link.client.trouble:
+        time.sleep(0.01)
+    return MoosDatabase(port=first.port), link
+
+
+@pytest.mark.parametrize("lockstep", [True, False])
+def test_a_game_waits_for_a_database_that_comes_back(lockstep):
+    """It is ended in the middle of a way; the helm that comes back with it is deployed anew, and steers on."""
+    first = MoosDatabase()
+    warp = {} if lockstep else {"moos_time_warp": 20.0}
+    mission = boat(first.port, lockstep=lockstep, end=1e4, on_loss="wait", **warp)
+    with Simulation(mission) as sim:
+        with MoosHelm(first.port):
+            sim.step(100)
+        second, vessel = restarted(sim, first)
+        began, moved = float(sim.t[0]), []
+
+        def play():
+            sim.step(100)
+            moved.append(sim.read("boat.pos")[0][0, 0])
+
+        thread = threading.Thread(target=play)
+        thread.start()
+        with second:
+            while not second.communities[0].clients:  # tussle is back
+                time.sleep(0.01)
+            time.sleep(0.2)
+            assert sim.t[0] <= began + 0.2  # no step goes on without a helm
+            with MoosHelm(first.port, points=((-60.0, 0.0),)):
+                thread.join()
+                assert second.read_values("DEPLOY") == ["true"]
+                assert sim.read("boat.MOOSAutonomy.losses")[0].tolist() == [[1]]
+                sim.step(300)
+            assert second.violations == []
+        assert sim.read("boat.pos")[0][0, 0, 0] < moved[0][0]  # to the new point, in the West
+        assert vessel.failure == ""
+
+
+@pytest.mark.parametrize("lockstep", [True, False])
+def test_a_game_goes_on_without_its_database_and_obeys_it_again(lockstep):
+    first = MoosDatabase()
+    warp = {} if lockstep else {"moos_time_warp": 100.0}
+    mission = boat(first.port, lockstep=lockstep, end=1e4, on_loss="go_on", timeout=5.0, **warp)
+    with Simulation(mission) as sim:
+        with MoosHelm(first.port, points=((1e6, 0.0),)):
+            sim.step(100)
+        second, _ = restarted(sim, first)
+        before = sim.read("boat.pos")[0][0, 0]
+        sim.step(50)
+        way = sim.read("boat.pos")[0][0, 0] - before
+        assert way[0] == pytest.approx(3.0 * 5.0, rel=0.05)  # heading and speed are held
+        with second, MoosHelm(first.port, points=((-1e6, 0.0),)):
+            while not second.read_values("DESIRED_HEADING"):
+                sim.step()
+            sim.step(400)
+            before = sim.read("boat.pos")[0][0, 0]
+            sim.step(20)
+            assert sim.read("boat.pos")[0][0, 0, 0] < before[0] - 1.0
+            assert second.violations == []
+
+
+def test_a_database_that_does_not_come_back_is_missed():
+    first = MoosDatabase()
+    with Simulation(boat(first.port, on_loss="wait", timeout=2.0, end=1e4)) as sim:
+        with MoosHelm(first.port):
+            sim.step(10)
+        first.close()
+        with pytest.raises(
+            PluginError, match=r"community 'alpha'\): no connection within 2 s \(Connection refused\)"
+        ):
+            sim.run()
+
+
+def test_a_database_of_another_name_is_not_the_one_that_is_waited_for():
+    first = MoosDatabase()
+    with Simulation(boat(first.port, on_loss="wait", end=1e4)) as sim:
+        with MoosHelm(first.port):
+            sim.step(10)
+        first.close()
+        with (
+            MoosDatabase(port=first.port, name="gilda"),
+            pytest.raises(PluginError, match="its community is 'gilda'"),
+        ):
+            sim.run()
 
 
 def test_two_helms_do_not_steer_together(database):

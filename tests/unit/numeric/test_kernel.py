@@ -18,7 +18,7 @@ import pytest
 
 from tussle.numeric import processor, store
 from tussle.numeric.fingerprint import Fingerprint
-from tussle.numeric.kernel import built, device, kernel, stats
+from tussle.numeric.kernel import built, device, kernel, routine, stats
 
 GAIN = 2.0
 
@@ -158,6 +158,32 @@ def test_threads_that_call_first_compile_once(own_cache):
     with ThreadPoolExecutor(4) as pool:
         assert set(pool.map(call, range(8))) == {42.0}
     assert stats.compiled == before + 1
+
+
+def test_functions_that_a_kernel_calls_may_print_raise_and_call_themselves(own_cache, forget_kernels, capsys):
+    """Compiled, and loaded from a file."""
+
+    @device
+    def told(x):
+        if x < 0.0:
+            raise ValueError("a negative number")
+        if x > 5.0:
+            print("large", x)
+        return 2.0 * x
+
+    @routine
+    def doubled(x, times):
+        return told(x) if times == 1 else doubled(told(x), times - 1)
+
+    for compiled in (1, 0):
+        before = stats.compiled
+        play = kernel("f8 i8 -> f8")(lambda x, times: doubled(x, times) + 0.0)
+        assert (play(3.0, 1), capsys.readouterr().out) == (6.0, "")
+        assert (play(3.0, 2), capsys.readouterr().out) == (12.0, "large 6.0\n")
+        with pytest.raises(ValueError, match="a negative number"):
+            play(-1.0, 3)
+        assert stats.compiled - before == compiled
+        forget_kernels()
 
 
 def test_who_waits_is_told_before_a_kernel_compiles(own_cache, monkeypatch):
@@ -587,6 +613,7 @@ def project(tmp_path):
     return run
 
 
+@pytest.mark.slow
 def test_edits_are_seen_and_only_what_changed_compiles(project):
     assert project() == [20.0, 1.5, 2.0, 3.0, 7.0, 5, 0]
     project.edit("constants.py", "9.0", "99.0")  # an imported constant

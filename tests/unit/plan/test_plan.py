@@ -172,14 +172,56 @@ def test_planners_of_ompl_propagate_with_the_motion_model(planner):
         ({"bounds": {"x": (0, 100)}}, "bounds of x and y are missing"),
         ({"bounds": {"x": (0, np.nan), "y": (0, 1)}}, "two finite numbers"),
         ({"goal": (1.0, 2.0)}, "three finite numbers"),
-        ({"start": {"x": 50.0, "y": 50.0}}, "touches an obstacle"),
-        ({"start": {"x": -5.0}}, "outside the bounds"),
+        (
+            {"start": {"x": 50.0, "y": 50.0}},
+            r"the start, \(50, 50, 0\), is in an obstacle or less than radius = 1 m from one",
+        ),
+        ({"start": {"x": 44.5, "y": 50.0}}, "the start, .* is in an obstacle or less"),
+        ({"start": {"x": -5.0}}, r"start: x = -5 is outside the bounds, 0 to 100"),
+        ({"start": {"x": 1.0, "yaw": 7.0}}, "start: yaw = 7 is outside the bounds"),
+        ({"start": {"x": 1.0, "pitch": math.nan}}, "start: pitch = nan is not finite"),
+        ({"goal": (1.0, math.inf, 0.0)}, "goal = .* it takes three finite numbers"),
+        (
+            {"goal": (50.0, 50.0, 0.0)},
+            r"the goal cannot be reached: all places within goal_radius = 3 m of \(50, 50, 0\) are in an obstacle",
+        ),
+        (
+            {"goal": (-3.1, 50.0, 0.0)},
+            r"the goal cannot be reached: x = -3\.1 is outside the bounds, 0 to 100, by more than goal_radius",
+        ),
+        ({"commands": {}}, "commands is empty; it takes one or more of speed, turn_rate"),
         ({"shortest": 3, "longest": 2}, "shortest <= longest"),
     ],
 )
 def test_problems_that_make_no_sense_are_refused(changes, error):
     with pytest.raises(ParameterError, match=error):
         problem(**changes)
+
+
+def test_goals_of_which_a_part_can_be_reached_are_planned_to():
+    """Its center is outside the bounds, or in a wall."""
+    for goal in ((102.5, 10.0, 0.0), (54.5, 10.0, 0.0)):
+        plan = solve(
+            problem(goal=goal, start={"x": 80.0, "y": 10.0}), seed=1, branches=40_000, stop_at_first=True
+        )
+        assert plan.is_solved
+        check(plan)
+
+
+@pytest.mark.parametrize("planner", [solve, lambda asked: solve_with_ompl(asked, "EST")])
+def test_a_start_in_the_goal_is_an_empty_plan(planner):
+    plan = planner(problem(start={"x": 88.0, "y": 11.0}))
+    assert plan.is_solved
+    assert (plan.cost, plan.commands.shape, plan.inputs.shape) == (0.0, (0, 2), (0, 3))
+    assert plan.path.tolist() == [[88.0, 11.0, 0.0, 0.0, 0.0]]
+    assert plan.nodes.tolist() == [[88.0], [11.0], [0.0]]
+    assert plan.distance_left == pytest.approx(math.hypot(2.0, 1.0))
+
+
+def test_a_search_without_time_tells_how_far_it_came():
+    plan = solve_with_ompl(problem(), "RRT", seconds=0.01)
+    assert not plan.is_solved
+    assert 3.0 < plan.distance_left <= 80.0
 
 
 def test_wrong_options_are_refused():

@@ -6,7 +6,6 @@ import math
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 from test_radio_network import Radio
 
 from tussle import Block, Mission, Simulation
@@ -106,6 +105,8 @@ def test_a_sphere_in_front_has_id_and_team():
 
 
 def test_a_turned_camera_sees_what_the_scene_says():
+    from scipy.spatial.transform import Rotation
+
     hills = HeightField.generate((80.0, 80.0), cell=2.0, z_std=0.5, seed=3)
     mesh = TriangleMesh([(6, -9, -9), (6, 9, -9), (9, 0, 12)], [(0, 1, 2)])
     house = Prism([(-9, 2), (2, 9), (-9, 9)], low=-9.0, high=9.0)

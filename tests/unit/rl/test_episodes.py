@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 from flee import Flee, mission
-from gymnasium.vector import AutoresetMode
+from gymnasium.vector import AutoresetMode, SyncVectorEnv
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tussle import Simulation
 from tussle.api import Autonomy, Handle
 from tussle.errors import ParameterError, TussleError
-from tussle.rl import make, make_swarm, make_vec, parallel_env
+from tussle.rl import choice, make, make_swarm, make_vec, parallel_env, uniform
 from tussle.stock import SimpleCapture, SimpleCollision
 
 N = 3
@@ -73,8 +73,7 @@ class Model:
         for w in range(N):
             alone = make_swarm(self.task, 1, autoreset="disabled")
             alone.reset(seed=int(self.swarm.seeds[w]), params=self.params[w])
-            fixed = {**alone.episodes.drawn(np.arange(1)), **self.params[w]}
-            begun = Simulation(self.task.played, int(self.swarm.seeds[w]), fixed)
+            begun = Simulation(self.task.played, int(self.swarm.seeds[w]), alone.episodes.values[0])
             assert alone.simulation.state_hash() == begun.state_hash()
             for actions in self.actions[w]:
                 alone.step(actions)
@@ -448,3 +447,116 @@ def test_worlds_that_cannot_be_copied_need_another_reset(task):
     swarm.step(np.ones((1, 6, 2), np.float32))
     assert swarm.seeds.tolist() == [1]
     assert speeds(swarm).tolist() == [5.0]
+
+
+# -- distributions ------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("where", ["params", "task", "text"])
+def test_each_episode_draws_from_its_distribution(task, where):
+    vary = {"task": {SPEED: uniform(10.0, 20.0)}, "text": {SPEED: "10:20"}}.get(where, ())
+    params = {SPEED: uniform(10.0, 20.0)} if where == "params" else None
+    swarm = make_swarm(task.replace(vary=vary, time_limit=0.2), 30)
+    swarm.reset(seed=1, params=params)
+    first = speeds(swarm)
+    assert 10.0 <= first.min() < 12.0 < 18.0 < first.max() <= 20.0
+    seen = [first]
+    for _ in range(6):
+        swarm.step(np.zeros((30, 6, 2), np.float32))
+        np.testing.assert_array_equal(swarm.params[SPEED], speeds(swarm))
+        if swarm.over.all():
+            np.testing.assert_array_equal(swarm.final_params[SPEED], seen[-1])
+            assert (speeds(swarm) != seen[-1]).all()
+            seen.append(speeds(swarm))
+    assert len(seen) == 4
+    again = make_swarm(task.replace(vary=vary), 1)
+    again.reset(seed=int(swarm.seeds[7]), params=params)
+    assert speeds(again).tolist() == [seen[-1][7]]
+    swarm.reset(seed=1)
+    np.testing.assert_array_equal(speeds(swarm), first)
+    swarm.reset(seed=1, params={})
+    np.testing.assert_array_equal(speeds(swarm), 20.0 if where == "params" else first)
+    assert (SPEED in swarm.params) is (where != "params")
+
+
+def test_worlds_may_have_distributions_and_values(task):
+    swarm = make_swarm(task, 4)
+    swarm.reset(seed=1, params={SPEED: [uniform(1.0, 2.0), 5.0, choice([7.0, 8.0]), uniform(10, 19, unit="kt")]})
+    one, two, three, four = speeds(swarm)
+    assert 1.0 < one < 2.0
+    assert two == 5.0
+    assert three in (7.0, 8.0)
+    assert 10 * 1852 / 3600 < four < 19 * 1852 / 3600
+    swarm.reset(seed=5, worlds=[0], params={SPEED: 3.0})
+    assert speeds(swarm).tolist() == [3.0, two, three, four]
+    swarm.reset(seed=6)
+    assert speeds(swarm)[:2].tolist() == [3.0, 5.0]
+    assert speeds(swarm)[3] != four
+    swarm.reset(worlds=[3], params={})
+    assert speeds(swarm)[3] == 20.0
+    assert swarm.params[f"_{SPEED}"].tolist() == [True, True, True, False]
+
+
+@pytest.mark.parametrize(
+    ("value", "message"),
+    [
+        (uniform(-1.0, 5.0), "vel_max = -1.0 is not allowed"),
+        (choice([1.0, "fast"]), "fast"),
+        ([uniform(1, 2), 3.0], "has 2 values for 1 worlds"),
+        ([-3.0, uniform(1, 2)][:1], "-3.0 is not allowed"),
+    ],
+)
+def test_a_distribution_is_checked_before_it_is_drawn(task, value, message):
+    swarm = make_swarm(task)
+    swarm.reset(seed=1, params={SPEED: 4.0})
+    before = swarm.simulation.state_hash()
+    with pytest.raises(ParameterError, match=message):
+        swarm.reset(seed=2, params={SPEED: value})
+    assert swarm.simulation.state_hash() == before
+    assert swarm.params == {SPEED: 4.0, f"_{SPEED}": True}
+    if not isinstance(value, list):
+        with pytest.raises(ParameterError, match=message):
+            make_swarm(task.replace(vary={SPEED: value}))
+    with pytest.raises(ParameterError, match=r"it takes uniform\(10, 20\)"):
+        make_swarm(task.replace(vary={SPEED: 3.0}))
+
+
+@pytest.mark.parametrize("view", ["Env", "ParallelEnv", "VectorEnv"])
+def test_infos_tell_seed_and_parameters(view, task):
+    reset, step, env = one_world(view, task)
+
+    def told(result):
+        info = result[-1]["prey_0"] if view == "ParallelEnv" else result[-1]
+        assert np.all(info["seed"] == env.swarm.seeds[0])
+        return {k: np.ravel(v).tolist() for k, v in info.get("params", {}).items() if not k.startswith("_")}
+
+    assert told(reset(1, None)) == {}
+    drawn = told(reset(2, {SPEED: uniform(10.0, 20.0), TURN: "90 deg/s"}))
+    assert drawn == {SPEED: speeds(env.swarm).tolist(), TURN: [np.pi / 2]}
+    if view != "ParallelEnv":
+        assert told(step()) == drawn
+    assert told(reset(3, {}))== {}
+
+
+def test_the_info_of_an_ended_episode_tells_its_seed_and_parameters():
+    """As Gymnasium's own vector environments do, from single ones."""
+    params = {"params": {SPEED: uniform(10.0, 20.0)}}
+    task = Bounds(reward={"caught": Bounds.reward["captured"]})
+    mine = make_vec(task, 3, autoreset=AutoresetMode.SAME_STEP)
+    theirs = SyncVectorEnv([lambda: make(task)] * 3, autoreset_mode=AutoresetMode.SAME_STEP)
+    mine.reset(seed=1, options=params)
+    for env, seed in zip(theirs.envs, mine.swarm.seeds, strict=True):
+        env.reset(seed=int(seed), options=params)
+    theirs._autoreset_envs[:] = False
+    n_ends = 0
+    for _ in range(80):
+        ones = np.ones((3, 6, 2), np.float32)
+        info, want = mine.step(ones)[-1], theirs.step(ones)[-1]
+        assert ("final_info" in info) is ("final_info" in want)
+        if "final_info" in info:
+            n_ends += info["_final_info"].sum()
+            np.testing.assert_array_equal(info["_final_info"], want["_final_info"])
+            assert info["final_info"].keys() == want["final_info"].keys()
+            for a, b in zip(leaves(info["final_info"]), leaves(want["final_info"]), strict=True):
+                np.testing.assert_allclose(a, b, rtol=1e-6)
+    assert n_ends > 5

@@ -13,7 +13,11 @@ from leagues import chase_league, constant
 
 from tussle.batch.executors import InProcess
 from tussle.errors import BatchError, ParameterError
+from tussle.rl import Battle
+from tussle.rl.flight import load_flight
 from tussle.rl.league import League, Pairing, ratings_of
+from tussle.rl.opponents import other_side
+from tussle.stock.autonomy.learned.plugin import policy_path
 
 
 def pairing(a, b, wins, draws, losses):
@@ -139,7 +143,7 @@ def test_another_file_is_another_league(tmp_path):
 def test_wrong_players_are_refused(policies, tmp_path):
     still, circles = policies
     for players, message in (
-        (["rule", still], r"did you mean 'rules'.*there is no file rule; it takes rules, an ONNX file, or NAME=FILE"),
+        (["rule", still], r"did you mean 'rules'.*there is no file rule; it takes rules, an ONNX file, NAME=rules or NAME=FILE"),
         ([still, f"still={circles}"], r"player 'still' is there twice; each has a name of its own, such as late="),
         (["rules"], r"there is no game with the players rules"),
         ([constant(tmp_path / "prey.onnx", 0.0, task="test/Flee-v0")], r"plays test/Flee-v0; this league takes policies of"),
@@ -147,7 +151,31 @@ def test_wrong_players_are_refused(policies, tmp_path):
     ):  # fmt: skip
         with pytest.raises(ParameterError, match=message):
             chase_league(*players)
-    with pytest.raises(ParameterError, match="tussle/Hover-v0 has no other side; a task names"):
+    with pytest.raises(ParameterError, match="tussle/Hover-v0 has no other side.*there are: tussle/Battle-v0, tussle/BattleBlue-v0"):
         League("tussle/Hover-v0", ["rules"])
     with pytest.raises(ParameterError, match="did you mean 'tussle/Battle-v0'"):
         League("tussle/Batle-v0", ["rules"])
+
+
+def test_the_advice_of_errors_can_be_followed(policies):
+    """Each error tells what to give instead: that is accepted."""
+    for players in (["rules", "rules"], ["rules", policies[0], policies[0]]):
+        with pytest.raises(ParameterError, match="is there twice") as refused:
+            chase_league(*players)
+        advice = str(refused.value).rpartition("such as ")[2]
+        assert "late" in chase_league(*players[:-1], advice).players
+    league = chase_league("rules", "again=rules", task="test/Flee-v0")
+    assert league.pairs[1] == ("rules of prey", "again of hunters")
+    with pytest.raises(ParameterError, match="there is no game with the players rules; a game has two"):
+        chase_league("rules")
+
+
+@pytest.mark.parametrize("name", ["Battle", "tussle/battle-v0", "Battle-v0", "tussle/Batle-v0", "battle"])
+def test_a_misspelt_task_is_reported_where_it_is_named(name):
+    near = r": there is no task .* \(did you mean 'tussle/Battle-v0'\?\)"
+    with pytest.raises(ParameterError, match=f"^TASK{near}"):
+        League(name, ["rules"])
+    with pytest.raises(ParameterError, match=f"^Learned.task{near}"):
+        load_flight(policy_path("predator_team"), name, "")
+    with pytest.raises(ParameterError, match=f"^Battle.opponents of tussle/Battle-v0{near}"):
+        other_side("tussle/Battle-v0", Battle(opponents=name))

@@ -34,6 +34,7 @@ def test_stable_baselines3_accepts_one_world(which, request):
     env.close()
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("one_thread")
 def test_ppo_of_stable_baselines3_learns_in_a_task():
     baselines = pytest.importorskip("stable_baselines3", reason=NEEDS["stable_baselines3"].reason)

@@ -118,7 +118,7 @@ def test_a_node_hears_of_the_cars_in_each_step_and_its_commands_move_them(peer):
     for number, name in enumerate(("entity1", "entity2")):
         odoms = [one for one in heard if one["kind"] == "odom" and one["name"] == name]
         assert [one["stamp"] for one in odoms] == [round(k * DT * NANO) for k in range(8)]
-        assert all(one["frames"] == [f"{name}/odom", f"{name}/base_footprint"] for one in odoms)
+        assert all(one["frames"] == [f"{name}/odom", f"{name}/base_link"] for one in odoms)
         for one, (pos, quat, vel, omega) in zip(odoms, states, strict=True):
             assert one["state"][:7] == [*pos[number], *quat[number]]
             assert one["state"][7:10] == pytest.approx([np.hypot(*vel[number][:2]), 0.0, 0.0], abs=1e-12)
@@ -137,9 +137,9 @@ def test_a_node_hears_of_the_cars_in_each_step_and_its_commands_move_them(peer):
     assert scans[0]["angles"] == pytest.approx([-math.pi / 2, math.pi / 2])
     chain = ["odom", "base_footprint", "base_link", "base_laser_link"]
     links = [
-        [f"{name}/{a}", f"{name}/{b}"]
+        list(pair)
         for name in ("entity1", "entity2")
-        for a, b in itertools.pairwise(chain)
+        for pair in itertools.pairwise(["world", *(f"{name}/{frame}" for frame in chain)])
     ]
     assert [one["frames"] for one in heard if one["kind"] == "tf"][-1] == links
 

@@ -52,16 +52,16 @@ def pose(store, values, position="geometry_msgs/Point"):
 @pytest.mark.parametrize("frame", NAMES)
 @pytest.mark.parametrize("child", NAMES)
 def test_bytes_of_an_odometry(store, frame, child):
-    vector, zero = named(store, "geometry_msgs/Vector3"), np.zeros(36)
+    vector, covariances = named(store, "geometry_msgs/Vector3"), np.arange(72.0).reshape(2, 36)
     at = named(store, "geometry_msgs/Pose")(*pose(store, STATE[:7]))
     moving = named(store, "geometry_msgs/Twist")(vector(*STATE[7:10]), vector(*STATE[10:]))
     message = named(store, "nav_msgs/Odometry")(
         header(store, frame),
         child,
-        named(store, "geometry_msgs/PoseWithCovariance")(at, zero),
-        named(store, "geometry_msgs/TwistWithCovariance")(moving, zero),
+        named(store, "geometry_msgs/PoseWithCovariance")(at, covariances[0]),
+        named(store, "geometry_msgs/TwistWithCovariance")(moving, covariances[1]),
     )
-    packed = odometry_bytes(frame, child)(STAMP, STATE)
+    packed = odometry_bytes(frame, child)(STAMP, STATE, covariances)
     assert packed == bytes(store.serialize_cdr(message, "nav_msgs/msg/Odometry"))
 
 
@@ -97,9 +97,9 @@ def test_bytes_of_an_imu_and_a_compass(store, frame):
     vector, zero = named(store, "geometry_msgs/Vector3"), np.zeros(9)
     attitude = named(store, "geometry_msgs/Quaternion")(-0.5, 0.25, 0.75, 0.5)
     imu = named(store, "sensor_msgs/Imu")(
-        header(store, frame), attitude, zero, vector(*STATE[7:10]), zero, vector(*STATE[10:]), zero
-    )
-    packed = imu_bytes(frame)(STAMP, STATE[3:7], STATE[7:10], STATE[10:])
+        header(store, frame), attitude, zero, vector(*STATE[7:10]), 0.25 * np.eye(3).ravel(), vector(*STATE[10:]), 4.0 * np.eye(3).ravel()
+    )  # fmt: skip
+    packed = imu_bytes(frame)(STAMP, STATE[3:7], STATE[7:10], STATE[10:], [0.25, 4.0])
     assert packed == bytes(store.serialize_cdr(imu, "sensor_msgs/msg/Imu"))
     field = named(store, "sensor_msgs/MagneticField")(header(store, frame), vector(*STATE[:3]), zero)
     packed = compass_bytes(frame)(STAMP, STATE[:3])
@@ -117,6 +117,16 @@ def test_a_twist_is_read_in_both_byte_orders(store, is_little):
     message = named(store, "geometry_msgs/Twist")(vector(1.0, 2.0, 3.0), vector(4.0, 5.0, 6.0))
     data = bytes(store.serialize_cdr(message, "geometry_msgs/msg/Twist", little_endian=is_little))
     assert twist_values(data) == (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
+
+
+@pytest.mark.parametrize("is_little", [True, False])
+@pytest.mark.parametrize("frame", ["", *NAMES])
+def test_a_stamped_twist_is_read_whatever_its_frame(store, is_little, frame):
+    vector = named(store, "geometry_msgs/Vector3")
+    twist = named(store, "geometry_msgs/Twist")(vector(1.0, 2.0, 3.0), vector(4.0, 5.0, 6.0))
+    message = named(store, "geometry_msgs/TwistStamped")(header(store, frame), twist)
+    data = bytes(store.serialize_cdr(message, "geometry_msgs/msg/TwistStamped", little_endian=is_little))
+    assert twist_values(data, is_stamped=True) == (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
 
 
 @pytest.mark.parametrize("name", DEFINITIONS)

@@ -49,7 +49,7 @@ def test_a_node_in_cpp_hears_a_car_and_drives_it(ros_domain, driver):
     for k, (pos, (x, y, z, sec, nanosec, *frames)) in enumerate(zip(states, odoms, strict=True)):
         assert [float(x), float(y), float(z)] == pos.tolist()
         assert int(sec) * NANO + int(nanosec) == round(k * DT * NANO)
-        assert frames == ["entity1/odom", "entity1/base_footprint"]
+        assert frames == ["entity1/odom", "entity1/base_link"]
     way = states[-1] - states[0]
     assert way == pytest.approx([8 * DT * 2.0 * math.cos(math.pi / 6), 8 * DT * 2.0 * 0.5, 0.0])
     assert int(scans[0][0]) == 5
@@ -82,16 +82,17 @@ def test_a_node_hears_of_the_cars_in_each_step_and_its_commands_move_them(ros_do
             states.append([simulation.read(f"car.{name}")[0][0] for name in ("pos", "quat", "vel", "omega")])
             simulation.step()
         last_stamp = round(7 * DT * NANO)
-        while sum(one["kind"] in ("odom", "tf") and one["stamp"] == last_stamp for one in heard) < 2 + 6:
+        while sum(one["kind"] in ("odom", "tf") and one["stamp"] == last_stamp for one in heard) < 2 + 8:
             heard.append(json.loads(node.stdout.readline()))
     for number, name in enumerate(("entity1", "entity2")):
         odoms = [one for one in heard if one["kind"] == "odom" and one["name"] == name]
         assert [one["stamp"] for one in odoms] == [round(k * DT * NANO) for k in range(8)]
         truths = [one for one in heard if one["kind"] == "base_pose_ground_truth" and one["name"] == name]
         assert truths
-        assert all({**one, "kind": "odom"} in odoms for one in truths)
+        assert all({**one, "kind": "odom", "frames": odoms[0]["frames"]} in odoms for one in truths)
+        assert truths[0]["frames"] == ["world", f"{name}/base_link"]
         for one, (pos, quat, vel, omega) in zip(odoms, states, strict=True):
-            assert one["frames"] == [f"{name}/odom", f"{name}/base_footprint"]
+            assert one["frames"] == [f"{name}/odom", f"{name}/base_link"]
             assert one["state"][:7] == [*pos[number], *quat[number]]
             assert one["state"][7:10] == pytest.approx([np.hypot(*vel[number][:2]), 0.0, 0.0], abs=1e-12)
             assert one["state"][10:] == pytest.approx([0.0, 0.0, omega[number][2]], abs=1e-12)
@@ -108,14 +109,14 @@ def test_a_node_hears_of_the_cars_in_each_step_and_its_commands_move_them(ros_do
     assert scan["limits"][:3] == pytest.approx([-math.pi / 2, math.pi / 2, math.pi / 4])
     chain = ["odom", "base_footprint", "base_link", "base_laser_link"]
     links = [
-        [f"{name}/{a}", f"{name}/{b}"]
+        list(pair)
         for name in ("entity1", "entity2")
-        for a, b in itertools.pairwise(chain)
+        for pair in itertools.pairwise(["world", *(f"{name}/{frame}" for frame in chain)])
     ]
     last = [one for one in heard if one["kind"] == "tf" and one["stamp"] == last_stamp]
     assert [one["frames"] for one in last] == links
-    assert last[0]["pose"] == [*states[7][0][0], *states[7][1][0]]
-    assert last[1]["pose"] == [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]
+    assert last[0]["pose"] == last[2]["pose"] == [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]
+    assert last[1]["pose"] == pytest.approx([*states[7][0][0], *states[7][1][0]], abs=1e-15)
     clocks = [one["stamp"] for one in heard if one["kind"] == "clock"]
     assert clocks == sorted(clocks)
     assert set(clocks) & {round(k * DT * NANO) for k in range(1, 9)}

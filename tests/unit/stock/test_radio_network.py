@@ -137,6 +137,58 @@ def test_a_full_transmitter_sends_at_its_bandwidth():
     assert found["sent"] == 400
 
 
+def test_a_signal_takes_its_time_by_the_distance():
+    """Sound in water, 1,500 m/s: 1 s to 1,500 m, besides 0.2 s on the air at 4,000 bit/s."""
+    blocks = talks("a", 0.0, last=1), *(hears(f"r{x}", float(x)) for x in (0, 140, 160, 1500, 3000))
+    for bandwidth, steps in ((np.inf, (1, 1, 2, 10, 20)), (4000.0, (2, 3, 4, 12, 22))):
+        sim, found = play(*blocks, end=3.0, range=5000.0, propagation_speed=1500.0, bandwidth=bandwidth)
+        read = [sim.read(f"r{x}.Radio.step_read")[0][0, 0] for x in (0, 140, 160, 1500, 3000)]
+        assert read == list(steps)
+        assert found["delivered"] == 5
+
+
+def test_who_sends_while_a_signal_arrives_does_not_receive_it_in_half_duplex():
+    """Both send for 0.2 s in the first step. At 1,500 m the other's signal arrives a second later, when nobody sends."""
+    sends = {"bandwidth": 4000.0, "half_duplex": True, "range": 5000.0}
+    blocks = talks("a", 0.0, last=1), talks("b", 1500.0, last=1)
+    assert play(*blocks, end=3.0, **sends)[1]["lost_half_duplex"] == 2
+    assert play(*blocks, end=3.0, propagation_speed=1500.0, **sends)[1]["delivered"] == 2
+    # One that has eight messages to send, for 1.6 s, does not hear the other's; its own arrive while the other listens.
+    busy = talks("a", 0.0, last=1, times=8), talks("b", 1500.0, last=1)
+    found = play(*busy, end=5.0, propagation_speed=1500.0, **sends)[1]
+    assert (found["lost_half_duplex"], found["delivered"]) == (1, 8)
+
+
+@pytest.mark.parametrize("half_duplex", [False, True])
+def test_senders_that_share_the_bandwidth_use_it_in_turn(half_duplex):
+    """Five senders and two messages each: 100 bytes take 0.1 s at 8,000 bit/s, so the last one is received after 1 s."""
+    blocks = talks("a", 0.0, count=5, last=1, times=2), hears("b", 10.0)
+    options = {"bandwidth": 8000.0, "half_duplex": half_duplex}
+    sim, found = play(*blocks, end=3.0, shared_bandwidth=True, **options)
+    assert sim.read("b.Radio.step_read")[0][0, 0] == 10
+    assert n_heard(sim, "b") == 10
+    assert found["lost_half_duplex"] == 0
+    alone = play(*blocks, end=3.0, **options)[0]
+    assert alone.read("b.Radio.step_read")[0][0, 0] in (2, 3)
+    # Together they send no more than the channel takes: 10 messages a second.
+    many = talks("a", 0.0, count=5), hears("b", 10.0)
+    sim, _ = play(*many, end=10.0, shared_bandwidth=True, **options)
+    assert 97 <= n_heard(sim, "b") <= 100
+    assert n_heard(play(*many, end=10.0, bandwidth=8000.0)[0], "b") > 400
+
+
+def test_worlds_of_a_stack_do_not_share_a_channel():
+    blocks = [talks("a", 0.0, count=5, last=1, times=2), hears("b", 10.0)]
+    mission = Mission(
+        blocks=blocks, networks=[RadioNetwork(bandwidth=8000.0, shared_bandwidth=True)], end=3.0, end_conditions="time"
+    )  # fmt: skip
+    with Simulation(mission, seeds=[1, 2, 3]) as stack:
+        hashes = [result.state_hash for result in stack.run()]
+        assert stack.read("b.Radio.step_read")[0][:, 0].tolist() == [10, 10, 10]
+    alone = [Simulation(mission, seed).run()[0].state_hash for seed in (1, 2, 3)]
+    assert hashes == alone
+
+
 def test_senders_that_talk_at_the_same_time_do_not_hear_each_other_in_half_duplex():
     """Two starts, uniform over 0.08 s, are less than 0.02 s apart with probability 1 - (1 - 1/4)^2."""
     pair = talks("a", 0.0), talks("b", 10.0)

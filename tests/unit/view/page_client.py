@@ -25,6 +25,8 @@ class PageClient:
         status: The last status.
         frame: The last frame: id -> what was seen of it, and its time.
         events: All events, as rows.
+        curves: (name, team, id) -> [time, value] of each change.
+        results: Names of the results of metrics and interactions.
         refusals: Why values were not taken.
         n_frames: Frames that were received.
         n_bytes: All that was received.
@@ -36,6 +38,8 @@ class PageClient:
         self.frame: dict = {}
         self.t = float("nan")
         self.events: list = []
+        self.curves: dict = {}
+        self.results: list[str] = []
         self.refusals: list[str] = []
         self.drawn: dict = {}
         self.past: list = []
@@ -76,7 +80,11 @@ class PageClient:
             self.n_frames += not isinstance(data, str)
             return
         if isinstance(data, str):
-            self.status = json.loads(data)
+            message = json.loads(data)
+            if message["kind"] == "curves":
+                self._take_curves(message)
+                return
+            self.status = message
             events = self.status["events"]
             self.events[events["from"] :] = events["rows"]
             self.refusals += [self.status["refusal"]] if self.status["refusal"] else []
@@ -92,6 +100,12 @@ class PageClient:
             else:
                 self.frame, self.t = chunk.frames[-1], float(chunk.t[-1])
                 self.n_frames += 1
+
+    def _take_curves(self, message: dict) -> None:
+        self.results = message["results"]
+        for change in message["changes"]:
+            curve = self.curves.setdefault((change["name"], change["team"], change["id"]), [])
+            curve[change["from"] :] = [list(pair) for pair in zip(change["t"], change["v"], strict=True)]
 
     # -- what somebody does -----------------------------------------------------------------------------------------------------------
 

@@ -70,7 +70,7 @@ def test_the_page_holds_what_was_recorded(hunted, tmp_path, world):
     assert export.n_bytes == (tmp_path / "page.html").stat().st_size
     assert export.n_entities == 14
     assert page.events == [[h.t, h.kind, h.id, h.other, h.text] for h in recording.events]
-    assert page.document["nEntities"] == 14
+    assert page.document["nEntities"] == [14]
     assert {"capture", "birth", "death", "end"} <= {kind for _, kind, *_ in page.events}
     assert dict(page.document["facts"])["World"] == f"{world} of 2"
     assert dict(page.document["facts"])["Seed"] == str(world + 1)

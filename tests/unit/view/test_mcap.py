@@ -246,6 +246,22 @@ def test_teams_are_counted(opened, hunted):
         assert message["alive"] == {f"team_{n}": int((frame.team == n).sum()) for n in (1, 2)}
 
 
+def test_columns_of_plugins_are_messages_of_each_entity(tmp_path):
+    recording = Recording(record(hunt(end=3.0), tmp_path / "run", columns="*.Boids.target,*.Predator.target"))
+    report = write_mcap(recording, tmp_path / "run.mcap")
+    found = Opened(tmp_path / "run.mcap").messages
+    targets = [recording.values(i, "Boids.target") for i in range(recording.n_frames)]
+    rows = [recording.frame(i).row_of(1) for i in range(recording.n_frames)]
+    assert [message for _, message in found["/columns/prey/1"]] == [
+        {"Boids": {"target": dict(zip("xyz", target[row].tolist(), strict=True))}}
+        for target, row in zip(targets, rows, strict=True)
+        if row >= 0
+    ]
+    hunters = [topic for topic in report.n_messages if topic.startswith("/columns/hunters/")]
+    assert len(hunters) == 3
+    assert all(type(m["Predator"]["target"]) is int for topic in hunters for _, m in found[topic])
+
+
 def test_fewer_moments_keep_all_events_and_the_last_moment(hunted, tmp_path):
     told = []
     report = write_mcap(

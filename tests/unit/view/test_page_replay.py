@@ -70,9 +70,73 @@ def test_a_served_run_is_what_was_recorded(runs, monkeypatch, is_mapped):
                 off = np.array([seen[who].pos for who in frame.id.tolist()]) - frame.pos
                 assert np.linalg.norm(off, axis=1).max() <= document["positionError"] + 1e-11
         assert len(json.loads(blob("events"))) == len(recording.events)
-        assert sum(n[0] for n in document["curves"]["n"]) == len(recording.frame(0))
+        curves = {
+            (c["name"], c["team"]): dict(zip(c["t"], c["v"], strict=True)) for c in json.loads(blob("curves"))
+        }
+        assert curves["left", 1][0.0] + curves["left", 2][0.0] == len(recording.frame(0))
         with pytest.raises(HTTPError, match="404"):
             blob("chunk-999")
+
+
+def columns_of(data, number):
+    """Values of each column of plugins in a chunk, by frame and id."""
+    document = data.document()
+    first, last = document["chunks"][number]
+    read = Bytes(data.blob(f"columns-{number}"))
+    counts = read.ints(last - first + 1)
+    ids = np.array(read.ints(sum(counts)))
+    frames = np.repeat(np.arange(first, last + 1), counts)
+    found = {}
+    for column in document["columns"]:
+        values = np.stack([read.reals(len(ids)) for _ in column["fields"] or [""]], axis=1)
+        found[column["name"]] = dict(
+            zip(zip(frames.tolist(), ids.tolist(), strict=True), values, strict=True)
+        )
+    return found
+
+
+@pytest.mark.parametrize("is_mapped", [False, True])
+def test_columns_of_plugins_are_served_chunk_by_chunk(tmp_path, monkeypatch, is_mapped):
+    monkeypatch.setattr(recorded_data, "SERVED_STATES", 100)
+    with Simulation(hunt(), [2, 3]) as sim, Recorder(sim, tmp_path / "run", columns="*.target,*.x"):
+        sim.step(40)
+    recording = Recording(tmp_path / "run", world=1, is_mapped=is_mapped)
+    data = RecordedData(recording, is_file=False)
+    about = {each["name"]: each for each in data.document()["columns"]}
+    assert about["Boids.target"]["units"] == ["m", "m", "m"]
+    assert (about["Predator.target"]["kind"], about["Predator.target"]["doc"]) == (
+        "int",
+        "Prey being hunted.",
+    )
+    assert "columns-0" in data.names
+    for number, (first, last) in enumerate(data.chunks):
+        found = columns_of(data, number)
+        for name, column in found.items():
+            for i in range(first, last + 1):
+                ids = recording.frame(i).id.tolist()
+                expected = recording.values(i, name).astype(float).filled(np.nan)
+                np.testing.assert_array_equal([column[i, who] for who in ids], expected)
+    assert data.blob(f"columns-{len(data.chunks)}") is None
+
+
+def test_a_run_without_columns_of_plugins_has_none_to_serve(runs):
+    data = RecordedData(Recording(runs[0]), is_file=True)
+    assert data.document()["columns"] == []
+    assert not [name for name in data.names if name.startswith("columns")]
+    assert data.blob("columns-0") is None
+
+
+def test_of_two_runs_the_columns_are_those_of_both(runs, tmp_path):
+    with Simulation(hunt(), 4) as sim, Recorder(sim, tmp_path / "run", columns="*.Boids.target"):
+        sim.step(40)
+    a, b = Recording(runs[0]), Recording(tmp_path / "run")
+    both = Comparison(a, b)
+    assert list(both.columns) == ["Boids.target"]
+    values = both.values(20, "Boids.target")
+    assert len(values) == len(both.frame(20))
+    n = len(a.frame(20))
+    assert values[:n].mask.all()
+    np.testing.assert_array_equal(values[n:].filled(0.0), b.values(20, "Boids.target").filled(0.0))
 
 
 def test_data_that_cannot_be_made_is_told_and_the_page_goes_on(runs, monkeypatch):

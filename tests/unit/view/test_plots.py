@@ -21,11 +21,14 @@ from tussle.view.plots import (
     Trajectories,
     altitude,
     captures,
+    column,
+    column_of_runs,
     density,
     distance,
     left,
     maps,
     plot_style,
+    runs_of,
     speed,
     trajectory,
     trajectory3d,
@@ -316,6 +319,76 @@ def test_few_are_lines_and_many_are_a_band_around_their_median(hunted, plot, col
     assert figure.axes[0].get_ylabel() == ("speed [m/s]" if plot is speed else "altitude [m]")
 
 
+@pytest.fixture(scope="module")
+def thinking(tmp_path_factory):
+    """Ten runs with columns of plugins."""
+    base = tmp_path_factory.mktemp("runs")
+    mission = hunt(n_prey=20, end=4.0)
+    return [record(mission, base / f"{i}", (i,), columns="*.target,*.Boids.speed") for i in range(1, 11)]
+
+
+def test_a_column_of_a_plugin_is_plotted_for_the_teams_that_have_it(thinking):
+    recording = Recording(thinking[0])
+    figure = column(recording, "Boids.target")
+    assert [axes.get_ylabel() for axes in figure.axes] == [f"Boids.target.{axis} [m]" for axis in "xyz"]
+    assert legend_of(figure)[0] == "prey, late"
+    assert "hunters" not in legend_of(figure)
+    median = lines_by_colour(figure.axes[1])[COLOURS[1]]
+    for t, v in list(zip(median.get_xdata(), median.get_ydata(), strict=True))[::10]:
+        values = recording.values(recording.index_at(t), "Boids.target")[:, 1]
+        assert v == pytest.approx(np.median(values.compressed()), rel=1e-12)
+
+
+def test_a_component_and_chosen_entities_and_columns_of_whole_numbers(thinking):
+    recording = Recording(thinking[0])
+    who = int(recording.frame(0).id[-1])
+    figure = column(recording, "Predator.target", Selection(entities=(who,)))
+    (line,) = figure.axes[0].lines
+    frames = range(recording.n_frames)
+    expected = [recording.values(i, "Predator.target")[recording.frame(i).row_of(who), 0] for i in frames]
+    assert line.get_ydata().tolist() == expected
+    assert figure.axes[0].get_ylabel() == "Predator.target"
+    assert len(column(recording, "Boids.target.z").axes) == 1
+    assert column(recording, "vx").axes[0].get_ylabel() == "vx [m/s]"
+
+
+def mean_at(recording, i):
+    return recording.values(i, "Boids.speed").compressed().mean()
+
+
+def test_two_runs_have_a_line_each(thinking):
+    runs = [Recording(path) for path in thinking[:2]]
+    figure = column_of_runs(runs, "Boids.speed")
+    assert legend_of(figure) == ["1", "2"]
+    for recording, line in zip(runs, figure.axes[0].lines, strict=True):
+        for t, v in list(zip(line.get_xdata(), line.get_ydata(), strict=True))[::40]:
+            assert v == pytest.approx(mean_at(recording, recording.index_at(t)), rel=1e-12)
+    assert "seed" not in figure.legends[0].get_title().get_text()
+
+
+def test_many_runs_have_the_median_and_bands_of_their_means(thinking, tmp_path):
+    (tmp_path / "runs").mkdir()
+    (tmp_path / "batch.json").touch()
+    with pytest.raises(ViewError, match="no run of the batch is recorded; tussle batch --record-runs"):
+        runs_of(tmp_path)
+    for i, path in enumerate(thinking):
+        shutil.copytree(path, tmp_path / "runs" / f"{i:06d}")
+    runs = [Recording(path) for path in runs_of(tmp_path)]
+    figure = column_of_runs(runs, "Boids.speed")
+    assert legend_of(figure) == ["prey, late, median", "half of the runs", "90 % of them"]
+    (median,) = figure.axes[0].lines
+    t, v = median.get_xdata()[200], median.get_ydata()[200]
+    assert v == pytest.approx(np.median([mean_at(run, run.index_at(t)) for run in runs]), rel=1e-12)
+
+
+def test_a_run_that_has_ended_has_no_values_afterwards(thinking, tmp_path):
+    short = Recording(record(hunt(n_prey=20, end=2.0), tmp_path / "short", columns="*.Boids.speed"))
+    figure = column_of_runs([Recording(thinking[0]), short], "Boids.speed")
+    line = figure.axes[0].lines[1]
+    ends = line.get_xdata()[np.isfinite(line.get_ydata())][-1]
+    assert ends == pytest.approx(2.0, abs=0.02)
+
+
 def test_chosen_entities_have_lines_of_their_own(hunted):
     tracks = Trajectories(Recording(hunted), Selection(entities=(2, 27, 26)))
     figure = speed(tracks)
@@ -451,12 +524,29 @@ def test_the_same_run_gives_the_same_bytes(hunted, tmp_path, form):
         ({"form": "pgn"}, r"there is no format 'pgn' \(did you mean 'png'\?\); there are: png, svg, pdf"),
         ({"kinds": ["distance"]}, "'distance' is of two entities, and none are given"),
         ({"kinds": ["speed"], "between": (1, 2)}, "'distance' is not among the plots: speed"),
+        (
+            {"columns": ["Boids.goal"]},
+            "there is no column 'Boids.goal'; there are: x, y.*tussle run --record-columns records",
+        ),
+        ({"columns": ["vxx"]}, r"there is no column 'vxx' \(did you mean 'vx'\?\)"),
     ],
 )
 def test_what_cannot_be_asked_for_is_told(hunted, tmp_path, asked, said):
     with pytest.raises(ParameterError, match=said):
         write_plots(Recording(hunted), tmp_path / "plots", **asked)
     assert not (tmp_path / "plots").exists()
+
+
+def test_what_cannot_be_plotted_of_columns_is_told(thinking, tmp_path):
+    runs = [Recording(path) for path in thinking[:2]]
+    with pytest.raises(ParameterError, match="of several runs only columns are plotted"):
+        write_plots(runs[0], tmp_path / "plots", others=runs[1:])
+    with pytest.raises(ParameterError, match="of several runs only columns are plotted"):
+        write_plots(runs[0], tmp_path / "plots", ["speed"], columns=["Boids.speed"], others=runs[1:])
+    with pytest.raises(ParameterError, match=r"the selected entities have no values of 'Boids\.speed'"):
+        column(runs[0], "Boids.speed", Selection(teams=(2,)))
+    written = write_plots(runs[0], tmp_path / "plots", columns=["Boids.speed"], others=runs[1:])
+    assert [file.name for file in written.files] == ["Boids.speed.png"]
 
 
 def test_a_place_that_cannot_be_written_is_told(collided, tmp_path):

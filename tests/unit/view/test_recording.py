@@ -6,10 +6,10 @@ import shutil
 import numpy as np
 import pyarrow as pa
 import pytest
-from recorded_games import head_on, hunt
+from recorded_games import head_on, hunt, record
 
 from tussle import Block, Recorder, Simulation
-from tussle.errors import RecordError
+from tussle.errors import ParameterError, RecordError
 from tussle.mission import read_mission
 from tussle.record.schema import TRAJECTORY
 from tussle.stock import Still
@@ -249,3 +249,9 @@ def test_a_run_file_that_says_something_else_than_the_table_is_refused(tmp_path,
     file.write_text(json.dumps(info))
     with pytest.raises(RecordError, match=r"run.json: worlds\[0\].steps = 'many' is not allowed"):
         Recording(tmp_path / "run")
+
+
+def test_a_column_that_was_not_recorded_is_told(tmp_path):
+    run = record(hunt(end=0.5), tmp_path / "run", columns="*.Boids.target")
+    with pytest.raises(ParameterError, match=r"no column 'Boids.goal' was recorded.*there are: Boids.target"):
+        Recording(run).values(0, "Boids.goal")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import sys
 
 import numpy as np
@@ -9,8 +10,8 @@ import pytest
 from recorded_games import hunt, record
 
 from tussle import load_run
-from tussle.errors import MissingExtraError, ViewError
-from tussle.numeric.quaternion import quat_rotate
+from tussle.errors import MissingExtraError, ParameterError, ViewError
+from tussle.numeric.quaternion import quat_multiply, quat_rotate
 from tussle.view import Recording
 from tussle.view.export.rosbag2 import write_rosbag2
 
@@ -45,9 +46,14 @@ def attitude(q):
     return [q.w, q.x, q.y, q.z]
 
 
-def test_a_bag_holds_the_states_of_the_tables(hunted, tmp_path):
+@pytest.mark.parametrize(("storage", "file"), [("mcap", "bag.mcap"), ("sqlite3", "bag.db3")])
+def test_a_bag_holds_the_states_of_the_tables(hunted, tmp_path, storage, file):
     seen = []
-    report = write_rosbag2(hunted, tmp_path / "bag", show=lambda done, of: seen.append((done, of)))
+    report = write_rosbag2(
+        hunted, tmp_path / "bag", storage=storage, show=lambda done, of: seen.append((done, of))
+    )
+    assert report.path == tmp_path / "bag" / file
+    assert report.path.is_file()
     table = load_run(hunted.path, frames="pandas").trajectory
     states = table[["t", "id", *COLUMNS]].to_numpy(float)
     expected = {(round(t * NANO), int(who)): state for t, who, *state in states.tolist()}
@@ -63,8 +69,8 @@ def test_a_bag_holds_the_states_of_the_tables(hunted, tmp_path):
                 transforms[when, one.child_frame_id] = one
         else:
             who = int(topic.removeprefix("/entity").removesuffix("/base_pose_ground_truth"))
-            assert message.header.frame_id == f"entity{who}/odom"
-            assert message.child_frame_id == f"entity{who}/base_footprint"
+            assert message.header.frame_id == "world"
+            assert message.child_frame_id == f"entity{who}/base_link"
             assert stamp_of(message.header.stamp) == when
             odometry[when, who] = message
     assert clocks == [round(t * NANO) for t in hunted.t.tolist()]
@@ -73,12 +79,25 @@ def test_a_bag_holds_the_states_of_the_tables(hunted, tmp_path):
     assert odometry.keys() == expected.keys()
     assert len({who for _, who in expected}) > 8
     for (when, who), state in expected.items():
-        pose, moved = odometry[when, who].pose.pose, transforms[when, f"entity{who}/base_footprint"].transform
+        pose, chain = odometry[when, who].pose.pose, []
+        for parent, child in itertools.pairwise(
+            ["world", *(f"entity{who}/{frame}" for frame in ("odom", "base_footprint", "base_link"))]
+        ):
+            chain.append(transforms[when, child])
+            assert chain[-1].header.frame_id == parent
+        _, footprint, base = (one.transform for one in chain)
+        assert footprint.translation.z == 0.0
+        assert attitude(footprint.rotation)[1:3] == [0.0, 0.0]  # level
+        at = numbers(footprint.translation)
+        turn = np.array(attitude(footprint.rotation))
+        place = at + quat_rotate(turn, np.array(numbers(base.translation)))
+        whole = quat_multiply(turn, np.array(attitude(base.rotation)))
+        assert place == pytest.approx(state[:3], abs=1e-9)
+        assert abs(whole @ state[3:7]) == pytest.approx(1.0, abs=1e-12)
         linear = numbers(odometry[when, who].twist.twist.linear)
-        assert numbers(pose.position) == state[:3] == numbers(moved.translation)
-        assert attitude(pose.orientation) == state[3:7] == attitude(moved.rotation)
+        assert numbers(pose.position) == state[:3]
+        assert attitude(pose.orientation) == state[3:7]
         assert quat_rotate(np.array(state[3:7]), np.array(linear)) == pytest.approx(state[7:], abs=1e-9)
-        assert transforms[when, f"entity{who}/base_link"].header.frame_id == f"entity{who}/base_footprint"
 
 
 def test_a_period_and_an_existing_bag(hunted, tmp_path):
@@ -89,6 +108,12 @@ def test_a_period_and_an_existing_bag(hunted, tmp_path):
     assert report.n_frames < hunted.n_frames / 2
     assert sorted(path.name for path in (tmp_path / "bag").iterdir()) == ["bag.mcap", "metadata.yaml"]
     assert [path.name for path in tmp_path.iterdir()] == ["bag"]
+
+
+def test_a_format_that_is_none_is_refused(hunted, tmp_path):
+    with pytest.raises(ParameterError, match="storage = 'bz2' is not allowed; allowed are mcap, sqlite3"):
+        write_rosbag2(hunted, tmp_path / "bag", storage="bz2")
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_what_is_no_bag_is_not_replaced(hunted, tmp_path):

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any, ClassVar
 
+import numpy as np
+
 from tussle.api.easy.shared import Shared, WorldDraw
 from tussle.api.easy.values import (
     BODY,
@@ -19,10 +21,6 @@ from tussle.api.easy.values import (
 from tussle.columns import Publish
 from tussle.errors import ParameterError, listed, nearest_name
 from tussle.scene import Scene
-
-if TYPE_CHECKING:
-    import numpy as np
-
 
 ROLES = {
     "autonomy": "an autonomy decides",
@@ -79,6 +77,33 @@ for _name, _doc in {**VECTORS, **NUMBERS}.items():
 def public_names(cls: type) -> list[str]:
     """Public attributes of a class, without columns and body columns."""
     return [n for n in dir(cls) if not n.startswith("_") and n not in BODY]
+
+
+def whole_id(called: str, number: Any) -> int:
+    """An id as a whole number.
+
+    Raises:
+        ParameterError: It is none.
+    """
+    is_number = isinstance(number, (int, float, np.number)) and not isinstance(number, bool)
+    if not is_number or number != number // 1 or number < 0:
+        raise ParameterError(
+            f"{called}: {number!r} is no id; ids are whole numbers from 1 on, and 0 is nobody"
+        )
+    return int(number)
+
+
+def check_id(called: str, number: Any, context: Any, world: int) -> None:
+    """See that an entity with an id has been in a world.
+
+    Raises:
+        ParameterError: None has.
+    """
+    largest = int(context.simulation().state.births.next_id[world]) - 1
+    if number > largest:
+        raise ParameterError(
+            f"{called}: there has been no entity {number!r}; the largest id so far is {largest}"
+        )
 
 
 def squared_distance(a: Entity, b: Entity) -> float:
@@ -210,6 +235,17 @@ class Me(Observer):
         setattr(plugin, name, value)  # raises the error about columns
 
     # -- others -------------------------------------------------------------------------------------------------------------
+
+    def entity(self, number: Any) -> Other | None:
+        """The entity with an id, as sensors and messages give it; None for id 0 and for removed entities.
+
+        Raises:
+            ParameterError: No entity has had this id.
+        """
+        found = self._entity(whole_id("me.entity", number))
+        if found is None:
+            check_id("me.entity", number, self._shared.g.context, self._world)
+        return found
 
     def _entity(self, entity: int) -> Other | None:
         """The entity with an id; None for id 0 and for removed entities."""

@@ -8,7 +8,15 @@ from typing import Any, ClassVar
 import numpy as np
 
 from tussle.api.bodies import IN_PLACE
-from tussle.api.easy.entities import Entity, Observer, Other, public_names, squared_distance
+from tussle.api.easy.entities import (
+    Entity,
+    Observer,
+    Other,
+    check_id,
+    public_names,
+    squared_distance,
+    whole_id,
+)
 from tussle.api.easy.search import Search
 from tussle.api.easy.shared import RandomNumbers, WorldDraw
 from tussle.api.easy.values import BODY, Cells, Columns, ReceivedMessage, Write, make_type, with_ids
@@ -152,19 +160,31 @@ class OneWorld:
         return list(self._members)
 
     def entity(self, number: int) -> Member | None:
-        """The entity with an id; None for id 0 and for removed entities."""
+        """The entity with an id; None for id 0 and for removed entities.
+
+        Raises:
+            ParameterError: No entity has had this id.
+        """
+        found = self._entity(whole_id("w.entity", number))
+        if found is None:
+            check_id("w.entity", number, self._shared.g.context, self._row)
+        return found
+
+    def _entity(self, number: int) -> Member | None:
         row = self._shared.g.rows_at(np.array([self._row]), np.array([number])).item()
         return None if row < 0 else self._shared.plugin.world_types[1](self._shared, number, row)
-
-    _entity = entity
 
     def distance(self, first: Entity, second: Entity) -> float:
         """Distance between two entities [m]."""
         return math.sqrt(squared_distance(first, second))
 
-    def kill(self, entity: Member, why: str) -> None:
-        """Remove an entity at the end of this step, for the reason `why`. Until then it stays visible."""
-        self._shared.g.kill(self._rows("kill", entity), why)
+    def kill(self, entity: Member, why: str) -> bool:
+        """Remove an entity at the end of this step, for the reason `why`. Until then it stays visible.
+
+        Returns:
+            True if it is removed by this call, False if an earlier one in this step did so.
+        """
+        return bool(self._shared.g.kill(self._rows("kill", entity), why).item())
 
     def move(self, entity: Member, *, pos: Any = None, vel: Any = None, quat: Any = None) -> None:
         """Set pos [m] (3,), vel [m/s] (3,) or quat (4,) of an entity. Its motion model continues from the new state."""

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 from tussle.errors import MissingExtraError, RecordError
 
 if TYPE_CHECKING:
+    from tussle.batch.report.answers import Answer
     from tussle.batch.report.drawing import Picture
     from tussle.batch.report.report_data import ReportData
     from tussle.batch.report.sections import Plot, Section
@@ -35,19 +36,28 @@ class Report:
     notes: tuple[str, ...]
 
 
-def write_report(results: Results, directory: str | Path, quantities: Sequence[str] = ()) -> Report:
+def write_report(
+    results: Results,
+    directory: str | Path,
+    quantities: Sequence[str] = (),
+    target: str | None = None,
+    over: str | None = None,
+) -> Report:
     """Write the page `index.html` and its plots; the same batch gives the same bytes.
 
     Args:
         results: What is reported.
         directory: Where to; made if need be.
         quantities: Expressions that get plots of their own beside wins and scores, such as "score[2]-score[3]".
+        target: The page opens with the answer to this question, see `Results.answers`; None for that of the command line.
+        over: Name of the variable whose smallest value is searched.
 
     Raises:
         ParameterError: There is no such quantity.
-        MissingExtraError: Matplotlib, Jinja or statsmodels is not installed.
+        MissingExtraError: Matplotlib or Jinja is not installed.
         RecordError: The directory cannot be written.
     """
+    from tussle.batch.report.answers import answers
     from tussle.batch.report.drawing import house_style, pictured
     from tussle.batch.report.report_data import ReportData
 
@@ -55,13 +65,16 @@ def write_report(results: Results, directory: str | Path, quantities: Sequence[s
         data = ReportData(results, quantities)
         sections = sections_of(data)
         pictures = {p.name: pictured(p.draw(), f"plot-{p.name}", p.title) for s in sections for p in s.plots}
+        short = answers(data)
     from tussle.batch.report.sections import answer, notes
 
+    found = results.answers(target, over)
+    asked = [] if found is None else [f"{sentence}." for sentence in found.sentences()]
     page = write_page(
         Path(directory) / INDEX, sections, pictures,
         title=str(results.info.get("name") or "A batch of games"), version=str(results.info.get("tussle", "")),
         source="a batch in memory" if results.path is None else f"the batch {results.path.resolve().name}",
-        answer=answer(data), notes=notes(data),
+        answer=" ".join([*asked, answer(data)]), answers=short, notes=notes(data),
     )  # fmt: skip
     missing = "".join(sorted({letter for picture in pictures.values() for letter in picture.missing}))
     note = f"the font of the PNG files has no {missing}; the page and the SVG files show it"
@@ -84,8 +97,8 @@ def sections_of(data: ReportData) -> list[Section]:
         ]
         chosen = [
             of_games.won,
+            *(effects if data.has_points else []),
             of_games.scores,
-            *effects,
             of_games.left,
             of_games.ended,
             of_games.networks,
@@ -115,6 +128,7 @@ def write_page(
     version: str,
     source: str,
     answer: str,
+    answers: Sequence[Answer] = (),
     notes: Sequence[str] = (),
     needs: str = "The page needs no other file",
 ) -> Path:
@@ -128,6 +142,7 @@ def write_page(
         version: Of tussle.
         source: What it was made from.
         answer: The result, as a sentence under the heading.
+        answers: Questions with their answers, under it.
         notes: What the reader should know, one line each.
         needs: What else the page needs, for its last line.
 
@@ -148,7 +163,7 @@ def write_page(
         autoescape=True, finalize=lambda value: value if hasattr(value, "__html__") else printable(str(value))
     )
     html = environment.from_string(folder.joinpath("page.html.j2").read_text(encoding="utf-8")).render(
-        title=title, version=version, source=source, answer=answer, notes=notes, needs=needs, sections=sections,
+        title=title, version=version, source=source, answer=answer, answers=answers, notes=notes, needs=needs, sections=sections,
         pictures=pictures, style=folder.joinpath("page.css").read_text(encoding="utf-8"),
     )  # fmt: skip
     try:

@@ -11,7 +11,6 @@ import numpy as np
 
 from tussle.batch.report.drawing import blank, legend_above, rule_x, rule_y, shortened
 from tussle.batch.report.formatting import estimate, percent
-from tussle.batch.report.report_data import Axis
 from tussle.event_texts import end_text
 from tussle.palette import INK, MUTED, NEUTRAL, PAPER, SEQUENTIAL, mixed
 
@@ -19,6 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from tussle.batch.response import FittedVariable
     from tussle.batch.sensitivity import Effect
     from tussle.batch.statistics import Share
 
@@ -42,7 +42,6 @@ class Series:
         low: Lower ends of the intervals, (n,); NaN if unknown.
         high: Upper ends, (n,).
         x: Positions of the values, (n,); None if all series share them.
-        dots: Positions and values of single points, each (n_points,), shown faintly; None for none.
     """
 
     name: str
@@ -52,7 +51,6 @@ class Series:
     low: np.ndarray
     high: np.ndarray
     x: np.ndarray | None = None
-    dots: tuple[np.ndarray, np.ndarray] | None = None
 
 
 def series_of(name: str, colour: str, marker: str, rows: Any) -> Series:
@@ -183,28 +181,49 @@ def edges_for(values: np.ndarray) -> np.ndarray:
 # -- what the varied values do ----------------------------------------------------------------------------------------------
 
 
-def along(
-    axis: Axis, series: Sequence[Series], label: str, *, is_share: bool = False, limits: Limits = None
+def response_curves(
+    axis: FittedVariable,
+    curves: Sequence[Series],
+    dots: Sequence[Series],
+    label: str,
+    *,
+    is_share: bool = False,
+    limits: Limits = None,
 ) -> Figure:
-    """Means along a range, joined by thin lines, with their intervals as bars."""
-    figure, ((plot,),) = blank(2.7)
-    handles = []
-    for each in series:
-        if each.dots is not None:
-            plot.plot(
-                *each.dots, "o", color=each.colour, alpha=0.28, markersize=2.0, markeredgewidth=0, zorder=1.5
-            )
-        handles.append((_marks(plot, each, axis.position), each.name))
+    """Fits along a variable as lines with bands, and the means of the points as dots, with bars where their intervals are known.
+
+    Args:
+        axis: The variable.
+        curves: The fits, each with its positions; none for too few points.
+        dots: The means of the points, each with their positions.
+        label: What it is.
+        is_share: Values are shares of games.
+        limits: Of the values.
+    """
+    figure, ((plot,),) = blank(2.9)
+    handles, has_bars = [], any(np.isfinite(each.low).any() for each in dots)
+    for each in dots:
+        bars = np.nan_to_num(np.maximum([each.mean - each.low, each.high - each.mean], 0.0))
+        drawn = plot.errorbar(
+            each.x, each.mean, bars if has_bars else None, color=each.colour, marker=each.marker, linestyle="none",
+            elinewidth=0.9, markersize=4.0 if has_bars else 3.2, alpha=0.9 if has_bars else 0.55, markeredgecolor=PAPER,
+            markeredgewidth=0.4,
+        )  # fmt: skip
+        handles.append([drawn, each.name])
+    for i, each in enumerate(curves):
+        plot.fill_between(each.x, each.low, each.high, color=each.colour, alpha=0.18, linewidth=0)
+        (line,) = plot.plot(each.x, each.mean, color=each.colour, linestyle=each.marker)
+        handles[i][0] = (handles[i][0], line)
     if axis.is_log:
         _make_log(plot, "x")
-    if 0 < len(axis.texts) <= MOST_TICKS:
-        plot.set_xticks(axis.position, axis.texts)
+    elif len(axis.values) <= MOST_TICKS:
+        plot.set_xticks([float(v) for v in axis.values], [f"{v:.6g}" for v in axis.values])
     plot.set_xlabel(axis_label(axis))
     _value_axis(plot.yaxis, label, is_share=is_share)
     if limits is not None:
         plot.set_ylim(*limits)
     rule_y(plot)
-    legend_above(figure, handles)
+    legend_above(figure, [(handle, name) for handle, name in handles])
     return figure
 
 
@@ -248,62 +267,92 @@ def effect_strengths(effects: Sequence[Effect]) -> Figure:
     return figure
 
 
-def heat_map(
-    across: Axis,
-    up: Axis,
-    value: np.ndarray,
+@dataclass(frozen=True)
+class Surface:
+    """A quantity over two variables: its fit on a grid, and the means of the points.
+
+    Args:
+        name: Of the panel; empty for one.
+        x: Positions of the grid from left to right, (nx,).
+        y: From below to above, (ny,).
+        value: The fit, (ny, nx).
+        dots: Positions and means of the points, (3, n).
+    """
+
+    name: str
+    x: np.ndarray
+    y: np.ndarray
+    value: np.ndarray
+    dots: np.ndarray
+
+
+def response_maps(
+    across: FittedVariable,
+    up: FittedVariable,
+    surfaces: Sequence[Surface],
     label: str,
     ends: tuple[str, ...] = (),
     *,
     is_share: bool = False,
 ) -> Figure:
-    """A quantity over two variables as colour; grey where there are no games.
+    """A quantity over two variables: contours of its fit, and the points in its colour, on one scale.
 
     Args:
         across: The variable from left to right.
         up: The variable from below to above.
-        value: Means, (up.n_places, across.n_places); NaN where there are no games.
+        surfaces: One panel each, one below the other.
         label: What it is.
         ends: Colours of the two sides of a difference; empty for what is no difference.
-        is_share: Values are shares.
+        is_share: Values are shares of games.
     """
     from matplotlib.colors import LinearSegmentedColormap, Normalize
+    from matplotlib.ticker import MaxNLocator
 
-    shown = np.ma.masked_invalid(value)
+    every = np.concatenate([v for s in surfaces for v in (s.value.ravel(), s.dots[2])])
+    low, high = float(np.nanmin(every)), float(np.nanmax(every))
+    colours = list(SEQUENTIAL)
     if ends:
-        largest = max(float(np.abs(shown).max()), 1e-9)
-        colours = [mixed(ends[0], INK, 0.12), "#f4f4f2", mixed(ends[1], INK, 0.12)]
-        norm = Normalize(-largest, largest)
-    else:
-        colours, norm = (
-            list(SEQUENTIAL),
-            Normalize(0.0 if is_share else float(shown.min()), float(shown.max())),
-        )
-    figure, ((plot,),) = blank(3.5)
-    x, y = (a.edges if not a.texts else np.arange(a.n_places + 1) - 0.5 for a in (across, up))
-    plot.set_facecolor(mixed(MUTED, "#ffffff", 0.55))
+        high = max(abs(low), abs(high), 1e-9)
+        low, colours = -high, [mixed(ends[0], INK, 0.12), "#f4f4f2", mixed(ends[1], INK, 0.12)]
     colour_map = LinearSegmentedColormap.from_list("tussle", colours)
-    mesh = plot.pcolormesh(x, y, shown, cmap=colour_map, norm=norm, edgecolors=PAPER, linewidth=0.4)
-    plot.set_xlabel(axis_label(across))
-    plot.set_ylabel(axis_label(up))
-    plot.spines[:].set_visible(False)
-    _map_ticks(plot, across, "x")
-    _map_ticks(plot, up, "y")
-    bar = figure.colorbar(mesh, ax=plot, aspect=28, pad=0.02, label=label)
+    norm = Normalize(low, high if high > low else low + 1.0)
+    planes = np.concatenate([s.value.ravel() for s in surfaces])
+    levels = MaxNLocator(7).tick_values(float(planes.min()), float(planes.max()))
+    figure, axes = blank(0.6 + 2.5 * len(surfaces), len(surfaces), sharex=True)
+    for plot, surface in zip(axes.flat, surfaces, strict=True):
+        plot.contourf(
+            surface.x, surface.y, surface.value, levels, cmap=colour_map, norm=norm, alpha=0.45, extend="both"
+        )
+        lines = plot.contour(surface.x, surface.y, surface.value, levels, colors=[MUTED], linewidths=0.7)
+        plot.clabel(
+            lines, fontsize=7, fmt=(lambda v: percent(abs(v) if ends else v, 0)) if is_share else _plain
+        )
+        plot.scatter(
+            *surface.dots[:2], c=surface.dots[2], cmap=colour_map, norm=norm, s=20, edgecolors=INK, linewidths=0.5, zorder=3, clip_on=False
+        )  # fmt: skip
+        plot.set_title(surface.name, fontsize=8.5, loc="left")
+        plot.set_ylabel(axis_label(up))
+        for axis, which in ((across, "x"), (up, "y")):
+            if axis.is_log:
+                _make_log(plot, which)
+    axes.flat[-1].set_xlabel(axis_label(across))
+    mappable = axes.flat[0].collections[-1]
+    bar = figure.colorbar(mappable, ax=list(axes.flat), aspect=28, pad=0.02, label=label)
     bar.outline.set_visible(False)
     if bar.solids is not None:
         bar.solids.set_rasterized(True)
     if is_share:
-        bar.ax.yaxis.set_major_formatter(lambda v, _: percent(abs(v), 0))
+        bar.ax.yaxis.set_major_formatter(lambda v, _: percent(abs(v) if ends else v, 0))
     return figure
 
 
 # -- parts of plots ---------------------------------------------------------------------------------------------------------
 
 
-def axis_label(axis: Axis) -> str:
+def axis_label(axis: FittedVariable) -> str:
     """Name of a variable with its unit."""
-    return shortened(axis.variable.name, 44) + (f" [{shortened(axis.unit, 12)}]" if axis.unit else "")
+    unit = getattr(axis.variable, "unit", "")
+    return shortened(axis.variable.name, 44) + (f" [{shortened(unit, 12)}]" if unit else "")
 
 
 def _rows_of_marks(figure: Figure, plot: Axes, series: Sequence[Series], n_rows: int) -> None:
@@ -337,16 +386,8 @@ def _value_axis(axis: Any, label: str, *, is_share: bool) -> None:
         axis.set_major_formatter(lambda v, _: percent(v, 0))
 
 
-def _map_ticks(plot: Axes, axis: Axis, which: str) -> None:
-    if axis.texts:
-        names = [shortened(text, 14) for text in axis.texts]
-        is_crowded = which == "x" and sum(map(len, names)) + 2 * len(names) > 46
-        turned: dict[str, Any] = (
-            {"rotation": 40, "ha": "right", "rotation_mode": "anchor"} if is_crowded else {}
-        )
-        (plot.set_xticks if which == "x" else plot.set_yticks)(range(axis.n_places), names, **turned)
-    elif axis.is_log:
-        _make_log(plot, which)
+def _plain(value: float) -> str:
+    return f"{value:.4g}".replace("-", "−")
 
 
 def _make_log(plot: Axes, which: str) -> None:

@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from tussle.batch.default_quantities import is_of_network, varies
+from tussle.batch.quantities import metric_of
 from tussle.batch.report import plots
 from tussle.batch.report.formatting import (
     capital,
@@ -23,9 +25,8 @@ from tussle.batch.report.formatting import (
     seconds,
     sentence,
 )
-from tussle.batch.report.report_data import Measure, ReportData, axis_of, varies
+from tussle.batch.report.report_data import Measure, ReportData
 from tussle.batch.selection import written
-from tussle.batch.statistics import Mean
 from tussle.batch.variables import Range
 from tussle.event_texts import END_TEXTS, end_text
 from tussle.palette import PAPER, mixed
@@ -135,7 +136,7 @@ def won(data: ReportData) -> Section:
         " scores."
     )
     found = [Plot("wins", "Games won", caption, lambda: plots.share_bars(shares, colours))]
-    if len(data.wins) >= 2:
+    if len(data.wins) >= 2 and not data.has_points:
         first, second = data.rivals[:2]
         label = f"score of {data.name_of(first)} minus score of {data.name_of(second)}"
         lead = Measure(f"score[{first}]-score[{second}]", "", None, label)
@@ -154,15 +155,33 @@ def _outside(values: np.ndarray) -> str:
 
 
 def scores(data: ReportData) -> Section:
-    """The section on the scores of teams and the means of all quantities."""
+    """The section on the means of all quantities, and their distributions at each of a few points."""
     found = []
-    for measures in (data.scores, *((measure,) for measure in data.measured)):
-        varied = [m for m in measures if varies(data.known(m.expression))]
-        if varied:
-            found.append(_distribution(data, varied))
+    if len(data.points) <= MOST_CURVES:
+        for measures in (data.scores, *((measure,) for measure in data.measured)):
+            varied = [m for m in measures if varies(data.known(m.expression))]
+            if varied and not data.has_points:
+                found.append(_distribution(data, varied))
+            elif data.has_points:
+                found += [_distribution_by_point(data, m) for m in varied]
     means = _means(data)
     title = "How much was scored" if data.rivals else "Quantities"
     return Section("scores", title, plots=found, tables=[means] if means.rows else [])
+
+
+def _distribution_by_point(data: ReportData, measure: Measure) -> Plot:
+    values = data.results.quantity(measure.expression)
+    rows = [values[(data.point == i) & np.isfinite(values)] for i in range(len(data.points))]
+    names = [data.point_name(i) for i in range(len(rows)) if len(rows[i])]
+    rows = [row for row in rows if len(row)]
+    title = data.title(measure.expression)
+    return Plot(
+        f"distribution-{file_name(measure.expression)}",
+        f"{capital(title)} at each point",
+        "Height: number of games, on one scale. Dot: mean. Line: the middle half of the games."
+        + _outside(np.concatenate(rows)),
+        lambda: plots.distributions(rows, names, [measure.colour] * len(rows), title),
+    )
 
 
 def _distribution(data: ReportData, measures: Sequence[Measure], name: str = "") -> Plot:
@@ -182,33 +201,39 @@ def _means(data: ReportData) -> ReportTable:
     """Means of all quantities that vary."""
     results = data.results
 
-    def is_score_again(name: str) -> bool:
-        """Return True if a metric repeats the team's score."""
-        plugin, _, score = name.rpartition(".")
-        return (
-            bool(plugin)
-            and score.startswith("score[")
-            and np.array_equal(data.known(name), data.known(score))
-        )
-
-    names = [q for q in results.quantities if not q.startswith(("wins[", "ties", "start[", "lost[", "steps"))]
-    is_count = is_of_network(data)  # these have their own section
-    names = [q for q in names if varies(data.known(q)) and not is_score_again(q) and not is_count(q)]
-    rows = [
-        (
-            data.title(m.name), estimate(m.value), interval(m.low, m.high), estimate(m.sd),
-            *(number(m.quantiles[q]) for q in (0.05, 0.5, 0.95)), count(m.n),
-        )
-        for m in results.means([*(m.expression for m in data.more), *names[:MOST_MEANS]])
-    ]  # fmt: skip
+    names = [q for q in results.quantities if metric_of(q) not in ("wins", "ties", "start", "alive", "steps")]
+    is_count = is_of_network(results.quantities)  # these have their own section
+    asked = [m.expression for m in data.more]
+    names = results.telling([*asked, *(name for name in names if not is_count(name))])
+    rows = [_mean_cells(data, name) for name in names[:MOST_MEANS]]
+    interval_, quantiles = ("lowest point", "highest point"), ("5 %", "median", "95 %")
     columns = [
         ("quantity", "text"),
-        *numbers("mean", "95 % interval", "sd", "5 %", "median", "95 %", "games"),
+        *numbers("mean", "95 % interval", "sd", *(interval_ if data.has_points else quantiles), "games"),
     ]
-    caption = "The interval is that of the mean. 5 %, median and 95 % are quantiles of the games. Constant quantities are left out."
+    caption = "The interval is that of the mean. "
+    caption += (
+        "sd: standard deviation of the games of a point. Lowest and highest point: the extreme means of points."
+        if data.has_points
+        else "5 %, median and 95 % are quantiles of the games."
+    )
+    caption += " What is constant, a varied value or another quantity again is left out."
     if len(names) > MOST_MEANS:
         caption += f" {len(names) - MOST_MEANS} more quantities are in the tables of the batch."
     return ReportTable("All quantities", columns, rows, caption)
+
+
+def _mean_cells(data: ReportData, name: str) -> tuple[str, ...]:
+    mean = data.results.means([name])[0]
+    head = (data.title(name), estimate(mean.value), interval(mean.low, mean.high))
+    if not data.has_points:
+        quantiles = (number(mean.quantiles[q]) for q in (0.05, 0.5, 0.95))
+        return (*head, estimate(mean.sd), *quantiles, count(mean.n))
+    points = data.results.means_by_point(name)
+    known = [point.value for point in points if point.n]
+    spread = [point.sd**2 for point in points if point.n > 1]
+    sd = math.sqrt(float(np.mean(spread))) if spread else math.nan
+    return (*head, estimate(sd), estimate(min(known)), estimate(max(known)), count(mean.n))
 
 
 # -- the games --------------------------------------------------------------------------------------------------------------
@@ -266,7 +291,9 @@ def networks(data: ReportData) -> Section:
     """The section on messages of lossy networks."""
     means = {
         m.name: m.value
-        for m in data.results.means(list(filter(is_of_network(data), data.results.quantities)))
+        for m in data.results.means(
+            list(filter(is_of_network(data.results.quantities), data.results.quantities))
+        )
     }
     names = list(dict.fromkeys(name.rpartition(".")[0] for name in means))
     reasons = dict.fromkeys(
@@ -288,14 +315,6 @@ def networks(data: ReportData) -> Section:
     caption = "Mean number per game of messages to others within reach, each receiver counted, and what became of them."
     tables = [ReportTable("", columns, [row(name) for name in names], caption)] if names else []
     return Section("networks", "What became of the messages", tables=tables)
-
-
-def is_of_network(data: ReportData) -> Callable[[str], bool]:
-    """A function that returns whether a quantity is a count of a network."""
-    every = set(data.results.quantities)
-    plugins = {name.removesuffix(".delivered") for name in every if name.endswith(".delivered")}
-    found = {plugin for plugin in plugins if f"{plugin}.sent" in every}
-    return lambda name: name.rpartition(".")[0] in found
 
 
 def ended(data: ReportData) -> Section:
@@ -428,7 +447,7 @@ def answer(data: ReportData) -> str:
         f" over {count(len(data.points), 'point')}" if data.has_points else ""
     )
     if not data.wins:
-        return f"{_who_was_left(data)} in {games}."
+        return f"{_on_average(data)} in {games}."
     shares = [s for s in results.shares() if s.n > 0]
     ties = sum(s.n for s in shares if s.team is None)
     winners = sorted((s for s in shares if s.team is not None), key=lambda s: -s.n)
@@ -445,44 +464,24 @@ def answer(data: ReportData) -> str:
     ]
     parts += [f"other teams {count(sum(s.n for s in winners[3:]))}"] if winners[3:] else []
     parts += [count(ties, "tie")] if ties else []
-    return " ".join([", ".join(parts) + ".", *_most_and_least(data)])
+    return ", ".join(parts) + "."
 
 
-def _most_and_least(data: ReportData) -> Iterator[str]:
-    """Yield where the best team won most and least, along the strongest variable, if the intervals do not overlap."""
-    if not data.variables:
-        return
-    leader = data.wins[0]
-    variable = data.by_strength(leader)[0]
-    axis = axis_of(variable, data.points, 4)
-    mean, low, high = data.means_at(axis, leader).T
-    if not np.isfinite(mean).any():
-        return
-    most, least = int(np.nanargmax(mean)), int(np.nanargmin(mean))
-    if low[most] > high[least]:
-        best, worst = (f"{variable.name} {axis.place_text(i)} ({percent(mean[i])})" for i in (most, least))
-        yield f"{leader.name} won most with {best} and least with {worst}."
-
-
-def _who_was_left(data: ReportData) -> str:
-    """Return how many of each team were left, and else what was measured, for games without scores."""
-    found = []
+def _on_average(data: ReportData) -> str:
+    """Return the means of the first quantities, for games that nobody wins."""
+    found, results = [], data.results
     over = ", over these points" if data.has_points else ""
-
-    def mean_text(mean: Mean, of: str) -> str:
+    for mean in results.means(results.defaults.leading[:MAX_SAID]):
         known = f" (95 % interval {interval(mean.low, mean.high)}{over})" if math.isfinite(mean.low) else ""
-        return f"{estimate(mean.value)}{of}{known}"
-
-    for measure in data.scores:
-        left_, start = data.results.means([measure.expression, measure.expression.replace("alive", "start")])
-        found.append(mean_text(left_, f" of {number(start.value)} {measure.name}"))
-    if found:
-        return f"{' and '.join(found)} were left on average"
-    if measured := data.results.means(data.results.measured):
-        texts = [f"{data.title(m.name)} was {mean_text(m, '')}" for m in measured[:MAX_SAID] if m.n]
-        return f"On average, {' and '.join(texts)}"
-    teams = [t for t in data.results.teams if f"alive[{t}]" in data.results.quantities]
-    return f"All of {' and of '.join(map(data.name_of, teams))} were left" if teams else "Nothing was counted"
+        team = mean.name.removeprefix("alive")
+        if team != mean.name:
+            start = results.means([f"start{team}"])[0].value
+            found.append(
+                f"{estimate(mean.value)} of {number(start)} {results.title(mean.name).partition(' of ')[2]} were left{known}"
+            )
+        else:
+            found.append(f"{data.title(mean.name)} was {estimate(mean.value)}{known}")
+    return f"On average, {' and '.join(found)}"
 
 
 def notes(data: ReportData) -> list[str]:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 
 from tussle.batch.report import plots
-from tussle.batch.report.drawing import shortened
+from tussle.batch.report.drawing import MARKERS, shortened
 from tussle.batch.report.formatting import (
     capital,
     count,
@@ -22,134 +22,161 @@ from tussle.batch.report.formatting import (
     sentence,
     signed,
 )
-from tussle.batch.report.report_data import FEWEST_SEEDS, MOST_VARIABLES, Axis, Measure, ReportData, axis_of
+from tussle.batch.report.report_data import MOST_VARIABLES, Measure, ReportData, strength_of
 from tussle.batch.report.sections import Plot, ReportTable, Section, numbers
+from tussle.batch.response import FittedVariable
 from tussle.batch.selection import written
 from tussle.batch.sensitivity import Effect
 from tussle.batch.statistics import PairedComparison
 from tussle.batch.variables import Range
 from tussle.errors import ParameterError
+from tussle.palette import TEAM_COLOURS
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-MOST_DOTS = 400
-"""Largest number of points that are shown one by one behind the means."""
+MOST_BARS = 40
+"""Up to so many points have their intervals as bars, if nothing else varies behind them."""
 MOST_PLACES = 20
 """Largest number of choices in a plot, and of points in a table."""
-MOST_CELLS = 16
-"""Largest number of bins along one side of a map."""
-POINTS_PER_CELL = 5
-FEWEST_CELLS = 4
-"""Fewest cells with games for which a map is drawn."""
+MOST_PANELS = 3
+"""Maps have a panel for each value of a choice with at most so many values."""
+N_ALONG, N_GRID = 41, 21
+"""Places of a fit along a variable, and along each side of a map."""
 MOST_NUMBERS = 6
 """Largest number of values of a numeric choice that are compared in pairs."""
+DASHES = ("-", "--", "-.", ":", (0, (5, 1)), (0, (1, 1)))
 
 
 def effects(data: ReportData) -> Section:
-    """Return the means of each quantity along each variable."""
-    title = "What the varied values do"
-    axes = [axis_of(variable, data.points) for variable in data.shown_variables]
+    """Return the response of each quantity to each variable."""
+    axes = data.shown_axes
     found = [_effects_of(data, axes, stem, measures) for stem, measures in data.groups] if axes else []
-    hidden = len(data.variables) - len(axes)
+    hidden = len(data.axes) - len(axes)
     lead = (
-        [f"The {MOST_VARIABLES} of {len(data.variables)} variables with the strongest effects are shown."]
+        [f"The {MOST_VARIABLES} of {len(data.axes)} variables with the strongest effects are shown."]
         if hidden
         else []
     )
-    by_variable = list(itertools.chain.from_iterable(zip(*found, strict=True)))
-    return Section("effects", title, lead if by_variable else [], by_variable)
-
-
-def _effects_of(data: ReportData, axes: Sequence[Axis], stem: str, measures: Sequence[Measure]) -> list[Plot]:
-    """Return plots of some measures along each variable, on one scale."""
-    label, is_share = measures[0].label, measures[0].is_share
-    lines = [[_series(data, axis, m) for m in measures] for axis in axes]
-    limits = _limits(list(itertools.chain.from_iterable(lines)), is_share) if len(axes) > 1 else None
-    return [
-        Plot(
-            f"{stem}-by-{file_name(axis.variable.name)}", f"{capital(label)} by {axis.variable.name}", _effect_caption(data, axis),
-            lambda axis=axis, line=line: _draw_effect(axis, line, label, is_share, limits),  # type: ignore[misc]
-        )
-        for axis, line in zip(axes, lines, strict=True)
-    ]  # fmt: skip
-
-
-def _draw_effect(
-    axis: Axis, line: Sequence[plots.Series], label: str, is_share: bool, limits: plots.Limits
-) -> Figure:
-    if axis.is_number:
-        return plots.along(axis, line, label, is_share=is_share, limits=limits)
-    return plots.in_rows(axis.texts[:MOST_PLACES], line, label, is_share=is_share, limits=limits)
-
-
-def _series(data: ReportData, axis: Axis, measure: Measure) -> plots.Series:
-    """Return the means of a quantity along an axis, with single points behind them if there are bins and not too many points."""
-    rows = data.means_at(axis, measure)[: None if axis.is_number else MOST_PLACES]
-    found = plots.series_of(measure.name, measure.colour, measure.marker, rows)
-    if axis.texts or measure.is_share or len(data.points) > MOST_DOTS:
-        return found
-    at = np.array([float(point[axis.variable.name]) for point in data.points])
-    return replace(found, dots=(at, data.mean_by_point(measure)))
-
-
-def _limits(series: Sequence[plots.Series], is_share: bool) -> tuple[float, float]:
-    every = np.concatenate([v for s in series for v in (s.mean, s.low, s.high, *(s.dots or ())[1:])])
-    low, high = float(np.nanmin(every)), float(np.nanmax(every))
-    room = 0.04 * (high - low) or 0.5
-    return (max(low - room, -0.02), min(high + room, 1.02)) if is_share else (low - room, high + room)
-
-
-def _effect_caption(data: ReportData, axis: Axis) -> str:
-    if not axis.texts:
-        places = f"Means of {count(len(data.points), 'point')} in {axis.n_places} bins of equal number."
-    elif axis.n_places > MOST_PLACES and not axis.is_number:
-        places = f"Mean at the first {MOST_PLACES} of {axis.n_places} values."
-    else:
-        places = "Mean at each value."
-    over = "over seeds"
-    if data.is_drawn:
-        over = (
-            "over points and seeds"
-            if len(np.unique(data.seed)) >= FEWEST_SEEDS
-            else "over points, with these seeds"
-        )
-    others = len(data.variables) - 1
-    scale = (
-        " The other variables vary behind each mean. Plots of one quantity have one scale." if others else ""
+    by_variable = list(itertools.chain.from_iterable(itertools.zip_longest(*found)))
+    return Section(
+        "effects", "What the varied values do", lead if by_variable else [], [p for p in by_variable if p]
     )
-    return f"{places} Bar: 95 % interval of the mean, {over}.{scale}"
+
+
+def _effects_of(
+    data: ReportData, axes: Sequence[FittedVariable], stem: str, measures: Sequence[Measure]
+) -> list[Plot]:
+    """Return plots of some measures along each variable; each measure by itself where a choice has a line for each value."""
+    found = []
+    for axis in axes:
+        is_split = data.lines is not None and data.lines != axis and len(measures) > 1
+        for some in [[m] for m in measures] if is_split else [list(measures)]:
+            name = f"{stem}-{some[0].team}" if is_split else stem
+            what = f"{some[0].label} of {some[0].name}" if is_split else some[0].label
+            if is_split and some[0].is_share:
+                what = f"games won by {some[0].name}"
+            draw = _curves if axis.is_number else _rows
+            found.append(
+                Plot(
+                    f"{name}-by-{file_name(axis.variable.name)}",
+                    f"{capital(what)} by {axis.variable.name}",
+                    _effect_caption(data, axis, some),
+                    lambda draw=draw, axis=axis, some=some: draw(data, axis, some),  # type: ignore[misc]
+                )
+            )
+    return found
+
+
+def _levels(
+    data: ReportData, axis: FittedVariable, measures: Sequence[Measure]
+) -> list[tuple[Measure, Mapping[str, Any], str, str, Any, str]]:
+    """Measure, values that are held, name, colour, dashes and marker of each line along an axis."""
+    lines = data.lines
+    if lines is None or lines == axis:
+        return [(m, {}, m.name, m.colour, "-", m.marker) for m in measures]
+    return [
+        (m, {lines.variable.name: value}, f"{written(value)}", colour, dashes, marker)
+        for m in measures
+        for value, colour, dashes, marker in zip(lines.values, TEAM_COLOURS, DASHES, MARKERS, strict=False)
+    ]
+
+
+def _curves(data: ReportData, axis: FittedVariable, measures: Sequence[Measure]) -> Any:
+    """Draw the fits along a number, and the means of the points."""
+    name, curves, dots = axis.variable.name, [], []
+    at = axis.spread(N_ALONG)
+    for measure, given, label, colour, dashes, marker in _levels(data, axis, measures):
+        means = data.results.means_by_point(measure.expression)
+        chosen = data.points_with(given)
+        x = np.array([float(data.points[i][name]) for i in chosen])
+        rows = np.array([(means[i].value, means[i].low, means[i].high) for i in chosen])
+        if not _has_bars(data, axis):
+            rows[:, 1:] = np.nan
+        dots.append(plots.Series(label, colour, marker, *rows.T, x))
+        response = data.response(measure)
+        if response is not None:
+            fit = response.along(name, at, given)
+            x = np.array(at, dtype=float)
+            curves.append(plots.Series(label, colour, dashes, fit.value, fit.low, fit.high, x))
+    return plots.response_curves(axis, curves, dots, measures[0].label, is_share=measures[0].is_share)
+
+
+def _has_bars(data: ReportData, axis: FittedVariable) -> bool:
+    """Nothing varies behind the points of an axis but what has lines."""
+    behind = [other for other in data.axes if other not in (axis, data.lines)]
+    return not behind and len(data.points) <= MOST_BARS
+
+
+def _rows(data: ReportData, axis: FittedVariable, measures: Sequence[Measure]) -> Any:
+    """Draw the means at each value of a choice."""
+    shown = replace(axis, values=axis.values[:MOST_PLACES])
+    series = [
+        plots.series_of(label, colour, marker, data.means_at(shown, measure, given))
+        for measure, given, label, colour, _, marker in _levels(data, axis, measures)
+    ]
+    names = [written(value) for value in shown.values]
+    return plots.in_rows(names, series, measures[0].label, is_share=measures[0].is_share)
+
+
+def _effect_caption(data: ReportData, axis: FittedVariable, measures: Sequence[Measure]) -> str:
+    lines = data.lines if data.lines != axis else None
+    behind = [other for other in data.axes if other not in (axis, lines)]
+    others = (
+        " and ".join(other.variable.name for other in behind) if len(behind) < 3 else "the other variables"
+    )
+    held = f", {others} as at all points" if behind else ""
+    is_fitted = all(data.response(m) is not None for m in measures)
+    each = f" for each {lines.variable.name}" if lines is not None else ""
+    if not axis.is_number:
+        first = (
+            f"the first {MOST_PLACES} of {len(axis.values)} values"
+            if len(axis.values) > MOST_PLACES
+            else "each value"
+        )
+        how = f"by the fit{held}" if is_fitted else "of its games"
+        return f"Mark: mean at {first}{each}, {how}. Bar: 95 % interval of the mean over the seeds."
+    bar = ", with its 95 % interval over the seeds" if _has_bars(data, axis) else ""
+    differ = f"; {others} differ{'s' if len(behind) == 1 else ''} between the dots" if behind else ""
+    dots = f"Dot: mean of the games of a point{bar}{differ}."
+    if not is_fitted:
+        return f"{dots} There are too few points for a fit."
+    return f"{dots} Line: smooth fit (Gaussian process){each}{held}. Band: 95 % interval of the fit at each place."
 
 
 # -- two variables ----------------------------------------------------------------------------------------------------------
 
 
 def maps(data: ReportData) -> Section:
-    """Quantities over the two strongest variables."""
+    """Quantities over the two strongest variables that are numbers."""
     section = Section("maps", "Two variables at once")
-    pair = sorted(data.by_strength()[:2], key=data.variables.index)
-    if len(pair) < 2:
+    if sum(axis.is_number for axis in data.axes) < 2:
         return section
-    n_bins = int(np.clip(np.sqrt(len(data.points) / POINTS_PER_CELL), 3, MOST_CELLS))
-    across, up = (axis_of(v, data.points, n_bins, is_even=True) for v in pair)
-    if not across.is_number and up.is_number:
-        across, up = up, across
-    cells = {(repr(p[pair[0].name]), repr(p[pair[1].name])) for p in data.points}
-    if len(cells) < FEWEST_CELLS or any(not a.is_number and a.n_places > MOST_PLACES for a in (across, up)):
-        return section
-    cut = "" if across.texts and up.texts else f"; ranges are cut into {n_bins} equal parts"
-    more = (
-        f" The two strongest of {len(data.variables)} variables; the others vary behind each cell."
-        if data.variables[2:]
-        else ""
-    )
-    caption = f"Mean of the games in each cell{cut}. Grey: no games.{more}"
-    found = [_maps_of(data, across, up, stem, measures, caption) for stem, measures in data.groups]
+    pair = [axis for axis in data.by_strength() if axis.is_number][:2]
+    across, up = sorted(pair, key=data.axes.index)
+    found = [_maps_of(data, across, up, stem, measures) for stem, measures in data.groups]
     return replace(section, plots=list(itertools.chain.from_iterable(found)))
 
 
 def _maps_of(
-    data: ReportData, across: Axis, up: Axis, stem: str, measures: Sequence[Measure], caption: str
+    data: ReportData, across: FittedVariable, up: FittedVariable, stem: str, measures: Sequence[Measure]
 ) -> list[Plot]:
     """One map of the difference of two rivals, or one map of each quantity."""
     title = f"by {across.variable.name} and {up.variable.name}"
@@ -157,23 +184,76 @@ def _maps_of(
         low, high = sorted(measures, key=lambda m: m.team or 0)
         what = f"{'share of the games won' if low.is_share else low.label}, {high.name} minus {low.name}"
         unit = ", in percentage points" if low.is_share else ""
-
-        def draw_difference() -> Figure:
-            value = data.cells(high, across, up) - data.cells(low, across, up)
-            label = f"◂ {shortened(low.name, 14)}  ·  {shortened(high.name, 14)} ▸"
-            return plots.heat_map(across, up, value, label, (low.colour, high.colour), is_share=low.is_share)
-
-        text = f"{caption} Colour: {what}{unit}; it is that of the team with more."
-        return [Plot(f"{stem}-map", f"{capital(what)}, {title}", text, draw_difference)]
+        label = f"◂ {shortened(low.name, 14)}  ·  {shortened(high.name, 14)} ▸"
+        more = Measure(f"{high.expression}-{low.expression}", "", None, label, low.is_share)
+        kinds = [
+            (
+                f"{stem}-map",
+                f"{capital(what)}, {title}",
+                f" Colour: {what}{unit}; it is that of the team with more.",
+                more,
+                (low.colour, high.colour),
+            )
+        ]
+    else:
+        kinds = [
+            (
+                f"{stem}-map-{m.team}" if m.team is not None else f"{stem}-map",
+                f"{capital(m.label)}: {m.name}, {title}" if m.team is not None else f"{m.label} {title}",
+                "", m, (),
+            )
+            for m in measures
+        ]  # fmt: skip
+    caption = _map_caption(data, across, up)
     return [
         Plot(
-            f"{stem}-map-{m.team}" if m.team is not None else f"{stem}-map",
-            f"{capital(m.label)}: {m.name}, {title}" if m.team is not None else f"{m.label} {title}",
-            caption,
-            lambda m=m: plots.heat_map(across, up, data.cells(m, across, up), m.label, is_share=m.is_share),  # type: ignore[misc]
+            name, text, caption + colour,
+            lambda m=m, ends=ends: plots.response_maps(  # type: ignore[misc]
+                across, up, _surfaces(data, m, across, up), m.label, ends, is_share=m.is_share
+            ),
         )
-        for m in measures
-    ]
+        for name, text, colour, m, ends in kinds
+        if data.response(m) is not None
+    ]  # fmt: skip
+
+
+def _panels(data: ReportData) -> FittedVariable | None:
+    return data.lines if data.lines is not None and len(data.lines.values) <= MOST_PANELS else None
+
+
+def _surfaces(
+    data: ReportData, measure: Measure, across: FittedVariable, up: FittedVariable
+) -> list[plots.Surface]:
+    response, panels, means = data.response(measure), _panels(data), data.mean_by_point(measure)
+    assert response is not None
+    xs, ys, found = across.spread(N_GRID), up.spread(N_GRID), []
+    for value in panels.values if panels is not None else [None]:
+        given = {} if panels is None else {panels.variable.name: value}
+        chosen = [i for i in data.points_with(given) if np.isfinite(means[i])]
+        dots = [[float(data.points[i][axis.variable.name]) for i in chosen] for axis in (across, up)]
+        plane = response.plane(across.variable.name, up.variable.name, xs, ys, given)
+        name = "" if panels is None else f"{panels.variable.name} = {written(value)}"
+        found.append(
+            plots.Surface(
+                name, np.array(xs, float), np.array(ys, float), plane, np.array([*dots, means[chosen]])
+            )
+        )
+    return found
+
+
+def _map_caption(data: ReportData, across: FittedVariable, up: FittedVariable) -> str:
+    panels = _panels(data)
+    behind = [axis.variable.name for axis in data.axes if axis not in (across, up, panels)]
+    numbers_ = sum(axis.is_number for axis in data.axes)
+    chosen = f" The two strongest of {numbers_} variables that are numbers." if numbers_ > 2 else ""
+    held = (
+        f", {' and '.join(behind) if len(behind) < 3 else 'the other variables'} as at all points"
+        if behind
+        else ""
+    )
+    return (
+        f"Dot: mean of the games of a point. Lines and ground: smooth fit (Gaussian process){held}.{chosen}"
+    )
 
 
 # -- sensitivity ------------------------------------------------------------------------------------------------------------
@@ -182,9 +262,9 @@ def _maps_of(
 def strengths(data: ReportData) -> Section:
     """The section on the influence of each variable on the quantities."""
     found, remarks = [], dict[str, None]()
-    for measure in data.measures if data.variables else ():
-        known = [e for e in _effects(data, measure) if _strength(e) is not None]
-        shown = sorted(known, key=lambda e: -(_strength(e) or 0.0))[:MOST_PLACES]
+    for measure in data.measures if data.axes else ():
+        known = [e for e in _effects(data, measure) if strength_of(e) is not None]
+        shown = sorted(known, key=lambda e: -(strength_of(e) or 0.0))[:MOST_PLACES]
         if shown:
             title = f"What {data.title(measure.expression)} depends on"
             caption = "Mark: estimate, the strongest at the top. Bar: its 95 % interval."
@@ -200,33 +280,38 @@ def strengths(data: ReportData) -> Section:
 
 
 def _effects(data: ReportData, measure: Measure) -> list[Effect]:
-    found = data.results.sensitivity(measure.expression)
-    if len(data.results.variables) > 1:
+    found = data.effects(measure)
+    if len(data.axes) > 1:
         return found
     return [
         replace(e, total=None, total_low=None, total_high=None) for e in found
     ]  # "with others" says nothing of one variable
 
 
-def _strength(effect: Effect) -> float | None:
-    values = (effect.total, effect.first_order, effect.rank_correlation)
-    return next((abs(v) for v in values if v is not None and np.isfinite(v)), None)
-
-
 # -- differences ------------------------------------------------------------------------------------------------------------
 
 
 def differences(data: ReportData) -> Section:
-    """Return the differences between the values of each choice, paired by seed."""
+    """Return the differences between the values of each choice: paired by seed, or by the fit where no points can be paired."""
     rows, lead = list[list[str]](), []
-    for variable in data.variables:
-        axis = axis_of(variable, data.points)
-        if isinstance(variable, Range) or axis.n_places > (MOST_NUMBERS if axis.is_number else MOST_PLACES):
+    for axis in data.axes:
+        if isinstance(axis.variable, Range) or len(axis.values) > (
+            MOST_NUMBERS if axis.is_number else MOST_PLACES
+        ):
+            continue
+        name = axis.variable.name
+        fitted = [row for m in data.measures for row in _fitted_differences(data, axis, m)]
+        if data.is_drawn and data.method != "product" and fitted:  # hardly any points would pair
+            lead.append(
+                f"The values of {name} are not compared in pairs, since points that differ in it differ in other variables, too; their "
+                "differences are those of the fit."
+            )
+            rows += fitted
             continue
         try:
             compared = [(ms, [_compared(data, axis, m) for m in ms]) for _, ms in data.groups]
         except ParameterError as error:
-            lead.append(f"The values of {variable.name} are not compared: {sentence(str(error))}")
+            lead.append(f"The values of {name} are not compared: {sentence(str(error))}")
             continue
         for measures, lines in compared:
             for pairs in zip(*lines, strict=True):
@@ -242,20 +327,38 @@ def differences(data: ReportData) -> Section:
         " chance."
     )
     table = ReportTable("", [("quantity", "text"), ("change", "text"), *columns], rows, caption)
-    return Section("differences", "Paired differences", lead, tables=[table] if rows else [])
+    return Section("differences", "Differences of choices", lead, tables=[table] if rows else [])
 
 
-def _compared(data: ReportData, axis: Axis, measure: Measure) -> list[PairedComparison]:
+def _fitted_differences(data: ReportData, axis: FittedVariable, measure: Measure) -> list[list[str]]:
+    """Each further value less the first one, the other variables as at all points, by the fit."""
+    response, name, first = data.response(measure), axis.variable.name, axis.values[0]
+    if response is None or axis.is_number:
+        return []
+    value = response.along(name, axis.values).value
+    scale, unit = (100.0, "\u00a0pp") if measure.is_share else (1.0, "")
+    shown, found = percent if measure.is_share else estimate, []
+    for i, other in enumerate(axis.values[1:], 1):
+        difference, low, high = response.difference(name, first, other)
+        found.append(
+            [
+                data.title(measure.expression), f"{name}={written(first)} → {name}={written(other)}", "–", shown(value[0]), shown(value[i]),
+                signed(estimate(scale * difference)) + unit, interval(low, high, scale, unit), "–", "–",
+            ]
+        )  # fmt: skip
+    return found
+
+
+def _compared(data: ReportData, axis: FittedVariable, measure: Measure) -> list[PairedComparison]:
     """Compare each further value with the first one.
 
     Raises:
         ParameterError: A value cannot be named, or the points cannot be paired.
     """
     sides: list[int | str] = []
-    for place in range(axis.n_places):
-        points = np.flatnonzero(axis.index == place)
-        name, value = axis.variable.name, written(data.points[int(points[0])][axis.variable.name])
-        sides.append(int(points[0]) if len(points) == 1 else f"{name}={value}")
+    for value in axis.values:
+        points = data.points_with({axis.variable.name: value})
+        sides.append(points[0] if len(points) == 1 else f"{axis.variable.name}={written(value)}")
     return [data.results.compare(measure.expression, sides[0], side) for side in sides[1:]]
 
 

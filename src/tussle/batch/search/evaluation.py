@@ -16,6 +16,7 @@ from tussle.batch.points import settings_of
 from tussle.batch.quantities import Quantity
 from tussle.batch.search.trials import Point, Trial, key_of_values
 from tussle.batch.statistics import means_of
+from tussle.batch.target import Target
 from tussle.batch.variables import Value, Variable
 from tussle.errors import BatchError, ParameterError, TussleError
 from tussle.mission import Mission
@@ -66,6 +67,7 @@ class Evaluator:
         runs: Games of each set of values.
         first_seed: Seeds of the games count up from here.
         options: Further arguments of `Batch`.
+        constraints: Bounds that means over the games are to keep.
 
     Attributes:
         corners: A batch of low, middle and high values, so far as they can be played; its fingerprint is that of the mission.
@@ -82,7 +84,9 @@ class Evaluator:
         runs: int,
         first_seed: int,
         options: Mapping[str, Any],
+        constraints: Sequence[Target] = (),
     ) -> None:
+        self.constraints = constraints
         self.source, self.variables, self.quantity = source, variables, quantity
         self.runs, self.first_seed, self.options = runs, first_seed, options
         self.corners = self._corners()
@@ -149,7 +153,10 @@ class Evaluator:
                     [batch.mission],
                     self.first_seed,
                     batch.patience,
-                    lambda results: self.quantity.names(results.quantities),
+                    lambda results: [
+                        q.names(results.quantities)
+                        for q in (self.quantity, *(c.quantity for c in self.constraints))
+                    ],
                 )
                 return
         raise errors[0]
@@ -185,9 +192,11 @@ class Evaluator:
         batch, errors = self._playable(points)
         playable = [point for i, point in enumerate(points) if i not in errors]
         played = iter(self._trials_of(playable, player.play(batch, on_progress)) if batch is not None else ())
-        nan, n = math.nan, self.runs
+        nan, n, nothing = math.nan, self.runs, (math.nan,) * len(self.constraints)
         return [
-            Trial(0, 0, dict(point), nan, nan, nan, n, errors[i], ()) if i in errors else next(played)
+            Trial(0, 0, dict(point), nan, nan, nan, n, errors[i], (), nothing)
+            if i in errors
+            else next(played)
             for i, point in enumerate(points)
         ]
 
@@ -203,6 +212,16 @@ class Evaluator:
                 by_seed = results.by_seed(text)
             except ParameterError as error:  # only games with other values have this result
                 unknown = str(error)
+        violations = np.full((len(points), len(self.constraints)), np.nan)
+        for j, constraint in enumerate(
+            self.constraints if not unknown and results.n_failed < results.n_runs else ()
+        ):
+            try:
+                means = results.by_seed(str(constraint.quantity)).mean(axis=0)
+            except ParameterError as error:
+                unknown = str(error)
+                break
+            violations[:, j] = constraint.bound - means if constraint.is_lower else means - constraint.bound
         found = []
         for i, (row, mean) in enumerate(zip(by_seed.T, means_of(text, list(by_seed.T)), strict=True)):
             bad = np.flatnonzero(~np.isfinite(row))
@@ -213,5 +232,10 @@ class Evaluator:
                     or f"seed {self.first_seed + int(bad[0])}: {text} is {row[bad[0]]}"
                 )
                 numbers = (math.nan,) * 3
-            found.append(Trial(0, 0, dict(points[i]), *numbers, len(bad), failure, tuple(row.tolist())))
+            elif not np.isfinite(violations[i]).all():
+                place = int(np.flatnonzero(~np.isfinite(violations[i]))[0])
+                failure = unknown or f"{self.constraints[place].quantity} has no value in some game"
+                numbers = (math.nan,) * 3
+            games, amiss = tuple(row.tolist()), tuple(violations[i].tolist())
+            found.append(Trial(0, 0, dict(points[i]), *numbers, len(bad), failure, games, amiss))
         return found

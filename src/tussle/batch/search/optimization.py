@@ -19,6 +19,7 @@ from tussle.batch.search.proposals import Proposer
 from tussle.batch.search.study import Study, best_of
 from tussle.batch.search.study_store import StudyStore, notes_on_versions, versions_of_samplers
 from tussle.batch.search.trials import MOST_TRIALS, Point, Trial
+from tussle.batch.target import Target
 from tussle.batch.variables import Variable
 from tussle.batch.varied import as_variables, variable_entry
 from tussle.documents import Whole, check_argument
@@ -70,6 +71,7 @@ class Optimization:
         plugin_files: Python files whose plugins the mission file may name.
         ends_by_time: The game ends at its end time whatever the mission says.
         run_timeout: Wall time that a game may take [s], as for `Batch`.
+        subject_to: Constraints on means over the runs of a trial, such as "lost[1] / start[1] < 0.2".
         options: Further options of `read_mission`.
 
     Raises:
@@ -94,6 +96,7 @@ class Optimization:
         plugin_files: Sequence[str | Path] = (),
         ends_by_time: bool = False,
         run_timeout: float | None = None,
+        subject_to: Sequence[str] = (),
         **options: Any,
     ) -> None:
         check_source(mission, "Optimization")
@@ -114,10 +117,13 @@ class Optimization:
         self.quantity = Quantity.parse(objective)
         self.variables, self.sampler, self.is_minimized = variables, sampler, minimize
         self.sample_seed, self.per_round = sample_seed, per_round
+        self.constraints = tuple(Target.parse(text, "subject_to") for text in subject_to)
         self._first = self._proposer().propose()
         options |= {"settings": settings, "plugin_files": tuple(plugin_files), "ends_by_time": ends_by_time}
         options["run_timeout"] = run_timeout
-        self.evaluator = Evaluator(mission, variables, self.quantity, runs, first_seed, options)
+        self.evaluator = Evaluator(
+            mission, variables, self.quantity, runs, first_seed, options, self.constraints
+        )
 
     # -- what is searched ---------------------------------------------------------------------------------------------------
 
@@ -142,6 +148,8 @@ class Optimization:
             "sample_seed": self.sample_seed,
             "per_round": self.per_round,
         }
+        if self.constraints:
+            contents["constraints"] = list(map(str, self.constraints))
         text = json.dumps([contents, self.evaluator.corners.fingerprint], default=str)
         fingerprint = hashlib.blake2b(text.encode(), digest_size=16).hexdigest()
         return {"format": 2, "fingerprint": fingerprint, **contents, "versions": versions_of_samplers()}
@@ -218,7 +226,14 @@ class Optimization:
             return Study(path, info if store is None else store.info, self.variables, tuple(done), notes)
 
     def _proposer(self) -> Proposer:
-        return Proposer(self.variables, self.sampler, self.sample_seed, self.per_round, self.is_minimized)
+        return Proposer(
+            self.variables,
+            self.sampler,
+            self.sample_seed,
+            self.per_round,
+            self.is_minimized,
+            len(self.constraints),
+        )
 
     def _round(
         self,
@@ -269,7 +284,7 @@ def optimize(
         processes: How many, instead of one per core.
         stack: Worlds side by side in each.
         on_progress: Called after each finished run, and now and then.
-        search: Further arguments of `Optimization`, such as minimize, runs, per_round, sampler and sample_seed.
+        search: Further arguments of `Optimization`, such as minimize, subject_to, runs, per_round, sampler and sample_seed.
 
     Raises:
         ParameterError: A variable, the quantity or a number is not allowed.

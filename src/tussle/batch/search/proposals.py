@@ -13,7 +13,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tussle.batch.search.trials import Point, Trial, distribution, frozen, parameter_of, value_of
+from tussle.batch.search.trials import (
+    Point,
+    Trial,
+    distribution,
+    frozen,
+    has_constraints_of_trials,
+    parameter_of,
+    value_of,
+)
 from tussle.batch.variables import Choice, Variable
 from tussle.errors import MissingExtraError, ParameterError, listed, nearest_name
 
@@ -36,6 +44,7 @@ class Proposer:
         seed: Of what it draws.
         per_round: Trials of a round.
         is_minimized: Smaller objectives are better.
+        n_constraints: Constraints of each trial.
 
     Raises:
         ParameterError: There is no such sampler, or it cannot search these variables.
@@ -43,7 +52,13 @@ class Proposer:
     """
 
     def __init__(
-        self, variables: Sequence[Variable], sampler: str, seed: int, per_round: int, is_minimized: bool
+        self,
+        variables: Sequence[Variable],
+        sampler: str,
+        seed: int,
+        per_round: int,
+        is_minimized: bool,
+        n_constraints: int = 0,
     ) -> None:
         if sampler not in SAMPLERS:
             raise ParameterError(
@@ -52,9 +67,12 @@ class Proposer:
         choices = [v.name for v in variables if isinstance(v, Choice)]
         if sampler == "cmaes" and choices:
             raise ParameterError(f"cmaes searches ranges, and {choices[0]} is a choice; tpe searches both")
+        if sampler == "cmaes" and n_constraints:
+            raise ParameterError("cmaes knows no constraints; tpe does")
         require_optuna(with_cmaes=sampler == "cmaes")
         import optuna
 
+        self._is_constrained = bool(n_constraints)
         self._variables, self._seed, self._per_round = tuple(variables), seed, per_round
         self._kind = sampler
         self._space = {v.name: distribution(v) for v in variables}
@@ -103,8 +121,16 @@ class Proposer:
             size = -(-fewest // self._per_round) * self._per_round
             study.sampler = optuna.samplers.CmaEsSampler(seed=seed, popsize=size)
         else:
-            study.sampler = optuna.samplers.TPESampler(seed=seed, multivariate=True, constant_liar=True)
+            is_told = self._is_constrained and not has_constraints_of_trials()
+            more: Any = {"constraints_func": _constraints_before_5} if is_told else {}
+            study.sampler = optuna.samplers.TPESampler(
+                seed=seed, multivariate=True, constant_liar=True, **more
+            )
         return study.ask(self._space)
+
+
+def _constraints_before_5(trial: optuna.trial.FrozenTrial) -> Sequence[float]:
+    return list(trial.system_attrs["constraints"])
 
 
 def importances(

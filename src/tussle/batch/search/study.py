@@ -15,6 +15,7 @@ from tussle.batch.points import settings_of
 from tussle.batch.search.proposals import importances
 from tussle.batch.search.trials import Trial, trials_table
 from tussle.batch.statistics import PairedComparison, paired_difference
+from tussle.batch.target import Target
 from tussle.batch.variables import Value, Variable
 from tussle.mission.codecs import written
 
@@ -49,9 +50,9 @@ class Study:
 
     @cached_property
     def ranking(self) -> list[Trial]:
-        """Complete trials of different values, the best first; of equal ones the earliest."""
+        """Complete trials of different values that keep the constraints, the best first; of equal ones the earliest."""
         sign = 1.0 if self.is_minimized else -1.0
-        ordered = sorted((t for t in self.trials if t.is_complete), key=lambda t: sign * t.objective)
+        ordered = sorted((t for t in self.trials if t.is_feasible), key=lambda t: sign * t.objective)
         first: dict[tuple[Any, ...], Trial] = {}
         for trial in ordered:
             first.setdefault(trial.key, trial)
@@ -59,7 +60,7 @@ class Study:
 
     @property
     def best(self) -> Trial | None:
-        """The best trial; None where all failed."""
+        """The best trial that keeps the constraints; None if none does or all failed."""
         return best_of(self.trials, self.is_minimized)
 
     @cached_property
@@ -91,14 +92,32 @@ class Study:
         """The trials that were the best so far when they came."""
         found: list[Trial] = []
         for trial in self.trials:
-            if trial.is_complete and (not found or is_better(trial, found[-1], self.is_minimized)):
+            if trial.is_feasible and (not found or is_better(trial, found[-1], self.is_minimized)):
                 found.append(trial)
         return found
 
     @property
     def table(self) -> pa.Table:
-        """One row per trial: trial, round, each variable, objective, low, high, n_failed, state, error, by_seed."""
+        """One row per trial: trial, round, each variable, objective, low, high, n_failed, state, error, by_seed, violations."""
         return trials_table(self.trials, self.variables)
+
+    @cached_property
+    def constraints(self) -> tuple[Target, ...]:
+        """What the means over the games of a trial are to keep."""
+        return tuple(map(Target.parse, self.info.get("constraints") or ()))
+
+    @property
+    def nearest(self) -> Trial | None:
+        """The complete trial that violates the constraints least, in all; None where all failed."""
+        complete = [t for t in self.trials if t.is_complete]
+        return min(complete, key=lambda t: sum(max(v, 0.0) for v in t.violations), default=None)
+
+    def constrained(self, trial: Trial) -> dict[str, float]:
+        """Mean over the games of a trial, of each quantity that is constrained."""
+        return {
+            str(c.quantity): c.bound - v if c.is_lower else c.bound + v
+            for c, v in zip(self.constraints, trial.violations, strict=True)
+        }
 
     @property
     def n_points(self) -> int:
@@ -130,9 +149,9 @@ def is_better(trial: Trial, than: Trial, is_minimized: bool) -> bool:
 
 
 def best_of(trials: Iterable[Trial], is_minimized: bool) -> Trial | None:
-    """The best complete trial, the earliest of equal ones; None where all failed."""
+    """The best complete trial that keeps the constraints, the earliest of equal ones; None for none."""
     best: Trial | None = None
     for trial in trials:
-        if trial.is_complete and (best is None or is_better(trial, best, is_minimized)):
+        if trial.is_feasible and (best is None or is_better(trial, best, is_minimized)):
             best = trial
     return best

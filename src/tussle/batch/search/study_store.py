@@ -44,6 +44,7 @@ STUDY = Document(
         "sampler": SAMPLERS,
         "sample_seed": Whole(),
         "per_round": Whole(1, MOST_TRIALS),
+        "constraints": Maybe([str]),
         "versions": Map(str),
     },
     BatchError,
@@ -57,10 +58,12 @@ TRIAL = {
     "n_failed": Whole(0, MOST_RUNS),
     "error": str,
     "by_seed": [Maybe(Real())],
+    "violations": Maybe([Maybe(Real())]),
 }
 """Fields of a trial in the journal, besides its parameters."""
 COMPARED = (
     "tussle", "name", "mission", "objective", "direction", "variables", "runs", "first_seed", "sampler", "sample_seed", "per_round",
+    "constraints",
 )  # fmt: skip
 """Settings that identify a search, in the order in which differences are reported."""
 PROPOSED_BY = ("optuna", "cmaes", "numpy", "scipy")
@@ -113,7 +116,7 @@ class StudyStore:
                 put_whole(self.path / STUDY_FILE, json_text(info))
             return info
         before = read_info(self.path)
-        if any(before.get(name) != info[name] for name in (*COMPARED, "fingerprint")):
+        if any(before.get(name) != info.get(name) for name in (*COMPARED, "fingerprint")):
             raise BatchError(
                 f"{self.path}: holds another search ({_difference(before, info)}); choose another directory, or remove it"
             )
@@ -165,8 +168,8 @@ def _journal(path: Path) -> JournalStorage:
 def _difference(before: Mapping[str, Any], now: Mapping[str, Any]) -> str:
     """Return the first difference between two searches."""
     for name in COMPARED:
-        if before.get(name) != now[name]:
-            if isinstance(now[name], (str, int)):
+        if before.get(name) != now.get(name):
+            if isinstance(now.get(name), (str, int)):
                 return f"its {name} is {before.get(name)!r}, not {now[name]!r}"
             return f"it differs in {name}"
     return "the mission or a plugin file has changed since"
@@ -234,6 +237,11 @@ def _against(i: int, trial: Any, info: Mapping[str, Any]) -> str:
         trial.value is not None and math.isfinite(trial.value)
     ):
         return f"trial {i}: state = {trial.state.name} is not allowed; its value is {trial.value}"
+    n_constraints = len(facts.get("violations") or ())
+    if n_constraints != len(info.get("constraints") or ()) and (n_constraints or is_complete):
+        return (
+            f"trial {i} has {n_constraints} violations, which are not as many as study.json has constraints"
+        )
     if n_games != info["runs"] and (n_games or is_complete):
         return f"trial {i} has {n_games} games; study.json says {info['runs']}"
     return ""

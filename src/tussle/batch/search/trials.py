@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
+from inspect import signature
 from typing import TYPE_CHECKING, Any
 
 import pyarrow as pa
@@ -22,6 +23,7 @@ FACTS = pa.schema(
     [
         ("trial", pa.int64()), ("round", pa.int32()), ("objective", pa.float64()), ("low", pa.float64()), ("high", pa.float64()),
         ("n_failed", pa.int32()), ("state", pa.string()), ("error", pa.string()), ("by_seed", pa.list_(pa.float64())),
+        ("violations", pa.list_(pa.float64())),
     ]
 )  # fmt: skip
 """Columns of every table of trials; the variables stand behind the first two."""
@@ -48,6 +50,7 @@ class Trial:
         n_failed: Runs that failed, or gave no number.
         error: The first failure, "" for none.
         by_seed: The quantity in the run of each seed, NaN where it failed; empty where the values cannot be played at all.
+        violations: By how much the mean over the seeds violates each constraint; <= 0 where it keeps it, NaN where a run failed.
     """
 
     number: int
@@ -59,6 +62,12 @@ class Trial:
     n_failed: int
     error: str
     by_seed: tuple[float, ...]
+    violations: tuple[float, ...] = ()
+
+    @property
+    def is_feasible(self) -> bool:
+        """No run failed, and all constraints are kept."""
+        return self.is_complete and all(violation <= 0.0 for violation in self.violations)
 
     @property
     def is_complete(self) -> bool:
@@ -143,16 +152,31 @@ def frozen(trial: Trial, variables: Sequence[Variable]) -> FrozenTrial:
     """A trial as Optuna keeps it; what Optuna does not know stands in its user attributes."""
     import optuna
 
+    constrained: dict[str, Any] = {}
+    if trial.is_complete and trial.violations:
+        has_own = has_constraints_of_trials()
+        named = {f"{i}": violation for i, violation in enumerate(trial.violations)}
+        constrained = (
+            {"constraints": named} if has_own else {"system_attrs": {"constraints": [*trial.violations]}}
+        )
     return optuna.trial.create_trial(
+        **constrained,
         state=optuna.trial.TrialState.COMPLETE if trial.is_complete else optuna.trial.TrialState.FAIL,
         value=trial.objective if trial.is_complete else None,
         params={v.name: parameter_of(v, trial.values[v.name]) for v in variables},
         distributions={v.name: distribution(v) for v in variables},
         user_attrs={
             "low": _or_none(trial.low), "high": _or_none(trial.high), "n_failed": trial.n_failed, "error": trial.error,
-            "by_seed": [_or_none(v) for v in trial.by_seed],
+            "by_seed": [_or_none(v) for v in trial.by_seed], "violations": [_or_none(v) for v in trial.violations],
         },
     )  # fmt: skip
+
+
+def has_constraints_of_trials() -> bool:
+    """Return True if Optuna's trials carry constraints, from Optuna 5 on; before, samplers have a function of constraints."""
+    import optuna
+
+    return "constraints" in signature(optuna.trial.create_trial).parameters
 
 
 def thawed(number: int, per_round: int, found: FrozenTrial, variables: Sequence[Variable]) -> Trial:
@@ -172,6 +196,7 @@ def thawed(number: int, per_round: int, found: FrozenTrial, variables: Sequence[
         number, number // per_round, {v.name: value_of(v, found.params[v.name]) for v in variables},
         _or_nan(found.value), _or_nan(attributes["low"]), _or_nan(attributes["high"]), attributes["n_failed"],
         attributes["error"], tuple(_or_nan(v) for v in attributes["by_seed"]),
+        tuple(_or_nan(v) for v in attributes.get("violations") or ()),
     )  # fmt: skip
 
 
@@ -198,6 +223,7 @@ def trials_table(trials: Sequence[Trial], variables: Sequence[Variable]) -> pa.T
             "trial": t.number, "round": t.round, **{name: _cell(v, t.values[v.name]) for name, v in columns.items()},
             "objective": _or_none(t.objective), "low": _or_none(t.low), "high": _or_none(t.high), "n_failed": t.n_failed,
             "state": "complete" if t.is_complete else "failed", "error": t.error or None, "by_seed": [_or_none(v) for v in t.by_seed],
+            "violations": [_or_none(v) for v in t.violations],
         }
         for t in trials
     ]  # fmt: skip

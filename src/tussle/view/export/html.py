@@ -62,6 +62,6 @@ def write_html(
     with whole_file(Path(path)) as part:
         part.write_bytes(page)
     return HtmlExport(
-        Path(path), document["nFrames"], document["nEntities"], document["nStates"], len(page),
+        Path(path), document["nFrames"], sum(document["nEntities"]), document["nStates"], len(page),
         position_error(data.step), ANGLE_ERROR, tuple(document["notes"]),
     )  # fmt: skip

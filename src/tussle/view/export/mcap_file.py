@@ -6,7 +6,8 @@ Open the file in Foxglove and add:
   transform in `/tf`; `/scene` draws bases and boundaries; `/labels` writes ids beside the entities when it is switched on. With an
   entity's frame, such as `prey/17`, as display frame the camera moves with that entity;
 * a Log panel for `/events`: births are debug messages, deaths and the end information, captures and collisions warnings;
-* a Plot panel with `/teams.alive.team_1` and so on: entities left by team.
+* a Plot panel with `/teams.alive.team_1` and so on: entities left by team; of a run with columns of plugins, those of each entity,
+  such as `/columns/prey/17.Boids.goal.x`.
 
 The file's clock is the simulated time: t = 12.5 s is 1970-01-01 00:00:12.5 UTC.
 """
@@ -15,7 +16,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -23,6 +24,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tussle.errors import MissingExtraError, ParameterError, ViewError
+from tussle.record.plugin_columns import PluginColumn
 from tussle.view.export.film.prescan import crowd_of
 from tussle.view.export.foxglove_scene import WORLD, SceneEntities, scenery_entities, stamp
 from tussle.view.export.whole_file import whole_file
@@ -39,6 +41,7 @@ SPACING = 0.5
 """Length of a model as a share of the median distance between neighbours, where it would be too small to be seen."""
 N_SPACINGS = 20
 """Frames that are sampled for that distance."""
+JSON_TYPES = {float: "number", int: "integer", bool: "boolean"}
 MAX_TIME = 2.0**32
 """Times of the file format are less [s]: 136 years."""
 
@@ -117,6 +120,7 @@ def write_mcap(
             frame = recording.frame(int(i))
             log_until(frame.t)
             messages.put_frame(frame, entities)
+            messages.put_columns(int(i), frame, entities.names(frame))
             if show is not None:
                 show(n, len(kept))
         log_until(math.inf)
@@ -142,7 +146,7 @@ class _Messages:
         from foxglove import Channel
         from foxglove.channels import FrameTransformsChannel, LogChannel, SceneUpdateChannel
 
-        self._recording, self._report = recording, report
+        self._recording, self._report, self._context = recording, report, context
         self._keys = {team: f"team_{team}" for team in recording.teams}
         counts = {key: {"type": "integer"} for key in self._keys.values()}
         properties = {"t": {"type": "number"}, "alive": {"type": "object", "properties": counts}}
@@ -217,3 +221,44 @@ class _Messages:
         self.put("/tf", frame.t, fg.FrameTransforms(transforms=transforms))
         alive = {key: int((frame.team == team).sum()) for team, key in self._keys.items()}
         self.put("/teams", frame.t, {"t": frame.t, "alive": alive})
+
+    def put_columns(self, i: int, frame: Frame, names: Sequence[str]) -> None:
+        """Add the columns of plugins in a frame: a message for each entity that has some, its numbers null where they are not finite."""
+        from foxglove import Channel
+
+        columns = self._recording.columns.values()
+        found = [self._recording.values(i, column.name) for column in columns]
+        values = [(~np.ma.getmaskarray(each)[:, 0], each.tolist()) for each in found]
+        for row, name in enumerate(names):
+            own = [
+                (column, rows[row]) for column, (has, rows) in zip(columns, values, strict=True) if has[row]
+            ]
+            if not own:
+                continue
+            topic = f"/columns/{name}"
+            if topic not in self._channels:
+                schema = {"title": "tussle.Columns", **_schema_of(column for column, _ in own)}
+                self._channels[topic] = Channel(topic, schema=schema, context=self._context)
+            message: dict[str, Any] = {}
+            for column, numbers in own:
+                for part, number in zip(column.parts, numbers, strict=True):
+                    *outer, last = part.split(".")
+                    inner = message
+                    for each in outer:
+                        inner = inner.setdefault(each, {})
+                    inner[last] = number if math.isfinite(number) else None
+            self.put(topic, frame.t, message)
+
+
+def _schema_of(columns: Iterable[PluginColumn]) -> dict[str, Any]:
+    """JSON schema of the messages with columns of plugins: an object for each name before a dot."""
+    found: dict[str, Any] = {"type": "object", "properties": {}}
+    for column in columns:
+        for part, unit in zip(column.parts, column.units, strict=True):
+            *outer, last = part.split(".")
+            inner = found["properties"]
+            for each in outer:
+                inner = inner.setdefault(each, {"type": "object", "properties": {}})["properties"]
+            about = f"{column.doc} [{unit}]" if unit else column.doc
+            inner[last] = {"type": JSON_TYPES[column.dtype], "description": about}
+    return found

@@ -11,11 +11,12 @@ from typing import Any, Literal
 
 import numpy as np
 
-from tussle.errors import MissingExtraError, ViewError
+from tussle.errors import MissingExtraError, ParameterError, ViewError
 from tussle.numeric.quaternion import quat_rotate_inverse
 from tussle.ros.messages import clock_bytes, odometry_bytes, transforms_bytes
-from tussle.ros.robot import AT_ORIGIN, FRAMES
+from tussle.ros.robot import AT_ORIGIN, FRAMES, ROOT, height_above_floor, on_floor
 from tussle.ros.steps import NANO, Transform
+from tussle.scene import Scene
 from tussle.view.export.whole_file import unwritable
 from tussle.view.frame import Frame
 from tussle.view.page.recorded import kept_frames
@@ -26,6 +27,8 @@ VERSION: Literal[8] = 8
 MAX_TIME = 2.0**31
 """Stamps of ROS are less [s]."""
 METADATA = "metadata.yaml"
+STORAGES = {"mcap": ".mcap", "sqlite3": ".db3"}
+"""Formats of the file of messages, by the names of `ros2 bag`, and the ends of its name."""
 
 
 @dataclass
@@ -51,9 +54,10 @@ def write_rosbag2(
     *,
     period: float | None = None,
     prefix: str = "entity",
+    storage: str = "mcap",
     show: Callable[[int, int], None] | None = None,
 ) -> BagReport:
-    """Write a run, complete or not, as a folder of rosbag2 with an MCAP file.
+    """Write a run, complete or not, as a folder of rosbag2.
 
     Topics: /clock, /tf, and base_pose_ground_truth of each entity. Angular velocities are not recorded, and 0.
 
@@ -62,10 +66,12 @@ def write_rosbag2(
         path: The folder; an existing bag is replaced.
         period: Time between states that are written [s]; None writes all.
         prefix: Beginning of the namespaces; the id follows.
+        storage: Format of its file of messages, one of STORAGES.
         show: Called after each state with the numbers of states written and to write.
 
     Raises:
         ViewError: There is nothing to write, the bag cannot be written, or a time does not fit.
+        ParameterError: The format is none of STORAGES.
         MissingExtraError: rosbags is not installed.
     """
     try:
@@ -74,12 +80,15 @@ def write_rosbag2(
         raise MissingExtraError(
             "rosbag2 needs rosbags, which is not installed: pip install 'tussle[ros2]'"
         ) from None
+    if storage not in STORAGES:
+        raise ParameterError(f"storage = {storage!r} is not allowed; allowed are {', '.join(STORAGES)}")
     target, kept = Path(path), kept_frames(recording.t, period)
     if not len(kept):
         raise ViewError(f"{recording.path}: the run holds no states, so there is nothing to write")
     if target.exists() and not (target / METADATA).is_file():
         raise unwritable(target, "it exists and is no rosbag2")
-    report = BagReport(target / f"{target.name}.mcap", len(kept))
+    scene = recording.mission.scene if recording.mission else Scene()
+    report = BagReport(target / f"{target.name}{STORAGES[storage]}", len(kept))
     shift = max(0, -math.floor(float(recording.t[0])))
     if shift:
         report.notes.append(f"t = 0 is {shift} s in the bag, since stamps of ROS are not negative")
@@ -88,8 +97,9 @@ def write_rosbag2(
     part = target.with_name(f".{target.name}.part")
     shutil.rmtree(part, ignore_errors=True)
     try:
-        with Writer(part / target.name, version=VERSION, storage_plugin=StoragePlugin.MCAP) as writer:
-            bag = _Bag(writer, prefix)
+        plugin = StoragePlugin[storage.upper()]
+        with Writer(part / target.name, version=VERSION, storage_plugin=plugin) as writer:
+            bag = _Bag(writer, prefix, scene)
             for n, i in enumerate(kept, 1):
                 bag.put(recording.frame(int(i)), shift)
                 if show is not None:
@@ -107,10 +117,10 @@ def write_rosbag2(
 class _Bag:
     """A bag that is open."""
 
-    def __init__(self, writer: Any, prefix: str) -> None:
+    def __init__(self, writer: Any, prefix: str, scene: Scene) -> None:
         from rosbags.typesys import Stores, get_typestore
 
-        self._writer, self._prefix, self.n_messages = writer, prefix, 0
+        self._writer, self._prefix, self._scene, self.n_messages = writer, prefix, scene, 0
         self._store = get_typestore(Stores.ROS2_HUMBLE)
         self._clock = self._topic("/clock", "rosgraph_msgs/msg/Clock")
         self._tf = self._topic("/tf", "tf2_msgs/msg/TFMessage")
@@ -123,7 +133,7 @@ class _Bag:
         if who not in self._robots:
             frames = [f"{self._prefix}{who}/{frame}" for frame in FRAMES[:3]]
             topic = self._topic(f"/{self._prefix}{who}/base_pose_ground_truth", "nav_msgs/msg/Odometry")
-            self._robots[who] = topic, odometry_bytes(frames[0], frames[1]), frames
+            self._robots[who] = topic, odometry_bytes(ROOT, frames[2]), frames
         return self._robots[who]
 
     def _put(self, topic: Any, when: int, data: bytes) -> None:
@@ -137,13 +147,13 @@ class _Bag:
         self._put(self._clock, when, clock_bytes(stamp))
         turned = quat_rotate_inverse(frame.quat.T, frame.vel.T).T
         states = np.concatenate([frame.pos, frame.quat, turned, np.zeros_like(turned)], axis=1).tolist()
+        pos = frame.pos.T
+        poses = on_floor(pos, frame.quat.T, height_above_floor(self._scene, pos))
         transforms: list[Transform] = []
-        for who, state in zip(frame.id.tolist(), states, strict=True):
-            topic, pack, (odom, footprint, base) = self._robot(who)
-            self._put(topic, when, pack(stamp, state))
-            transforms += (
-                Transform(odom, footprint, stamp, state[:7]),
-                Transform(footprint, base, stamp, AT_ORIGIN),
-            )
+        for who, state, *own in zip(frame.id.tolist(), states, *poses, strict=True):
+            topic, pack, frames = self._robot(who)
+            self._put(topic, when, pack(stamp, state, None))
+            for parent, child, pose in zip([ROOT, *frames], frames, [AT_ORIGIN, *own], strict=False):
+                transforms.append(Transform(parent, child, stamp, pose))
         if transforms:
             self._put(self._tf, when, transforms_bytes(transforms))

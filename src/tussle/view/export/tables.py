@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from itertools import chain
 from pathlib import Path
 
 import pyarrow as pa
@@ -118,6 +119,9 @@ def _write(
     show: Callable[[int], None] | None,
 ) -> int:
     """Write batches to a file; return the number of rows written."""
+    first = next(batches, None)
+    if first is not None:
+        schema, batches = first.schema, chain([first], batches)
     plain = pa.schema(
         [pa.field(f.name, pa.string() if pa.types.is_dictionary(f.type) else f.type) for f in schema]
     )

@@ -11,8 +11,10 @@ import numpy as np
 
 from tussle.errors import ViewError
 from tussle.mission import Mission
+from tussle.record.plugin_columns import PluginColumn
 from tussle.view.drawn import Shape
 from tussle.view.frame import Event, Frame
+from tussle.view.page.settings import differing_settings
 from tussle.view.scenery import Scenery
 from tussle.view.sight import Sight
 from tussle.view.style import Colour, Style
@@ -103,6 +105,7 @@ class Comparison:
         shift: How far the second run is moved so as to stand beside the first [m], (3,).
         difference: Where they part; None where they do not.
         id_shift: What is added to the ids of the second run.
+        team_shift: What is added to the numbers of its teams.
 
     Raises:
         ViewError: One of them has no moments.
@@ -118,9 +121,12 @@ class Comparison:
         self.shift = np.zeros(3) if is_over_each_other else _place_beside(a, b)
         self.id_shift = 10 ** len(str(_largest_id(a)))
         self.blocks = [*(f"A {name}" for name in a.blocks), *(f"B {name}" for name in b.blocks)]
-        self.block_teams = [*a.block_teams, *b.block_teams]
-        self.teams = b.teams | a.teams
-        self.style: Any = _Both(a.style, b.style, len(a.blocks))
+        # Teams of the two runs are teams of their own.
+        self.team_shift = 10 ** len(str(2 * max(map(abs, [*a.teams, *b.teams]), default=0)))
+        self.block_teams = [*a.block_teams, *(team + self.team_shift for team in b.block_teams)]
+        self.teams = {team: f"A {name}" for team, name in a.teams.items()}
+        self.teams |= {team + self.team_shift: f"B {name}" for team, name in b.teams.items()}
+        self.style: Any = _Both(a.style, b.style, len(a.blocks), self.team_shift, list(a.teams))
         self.difference = first_difference(a, b)
 
     @property
@@ -146,10 +152,14 @@ class Comparison:
         low, high = np.minimum(one.low, other.low + self.shift), np.maximum(one.high, other.high + self.shift)
         if not self.shift.any():
             return replace(one, low=low, high=high)
-        bases = [replace(base, position=tuple(np.add(base.position, self.shift))) for base in other.bases]
+        bases = [
+            replace(base, team=base.team + self.team_shift, position=tuple(np.add(base.position, self.shift)))
+            for base in other.bases
+        ]
         regions = [
             replace(
                 r,
+                team=r.team and r.team + self.team_shift,
                 mesh=r.mesh.placed(at=self.shift.tolist()),
                 outline=r.outline + self.shift.astype(np.float32),
                 parts=tuple(replace(part, vertices=part.vertices + self.shift) for part in r.parts),
@@ -176,6 +186,23 @@ class Comparison:
         return f"they differ first at t = {d.t:g} s (step {d.step:,}): {d.text}"
 
     @property
+    def signs(self) -> list[tuple[str, list[float]]]:
+        """Names of the runs, and where they stand in the scene [m], (3,): at the northern edge of each, or one for both."""
+        names = [f"A: {self.a.path.name}", f"B: {self.b.path.name}"]
+        edges = [
+            [0.5 * float(low[0] + high[0]), float(high[1]), float(low[2])]
+            for low, high in ((run.scenery.low, run.scenery.high) for run in (self.a, self.b))
+        ]
+        if not self.shift.any():
+            return [(f"{names[0]} · {names[1]}, paler", edges[0])]
+        return [(names[0], edges[0]), (names[1], np.add(edges[1], self.shift).tolist())]
+
+    @cached_property
+    def differing(self) -> list[tuple[str, str, str]]:
+        """Settings that differ: path, value in the first run, value in the second."""
+        return differing_settings(self.a, self.b)
+
+    @property
     def notes(self) -> list[str]:
         said = f"A is {self.a.path.name}; B, paler, is {self.b.path.name}"
         own = [f"{name}: {note}" for name, run in (("A", self.a), ("B", self.b)) for note in run.notes]
@@ -199,10 +226,24 @@ class Comparison:
         a, b = (run.frame(int(pair[i])) for run, pair in zip((self.a, self.b), self._pairs, strict=True))
         return Frame(
             float(self.t[i]), max(a.step, b.step), np.concatenate([a.id, b.id + np.int32(self.id_shift)]),
-            np.concatenate([a.team, b.team]), np.concatenate([a.block, b.block + np.int32(len(self.a.blocks))]),
+            np.concatenate([a.team, b.team + np.int32(self.team_shift)]), np.concatenate([a.block, b.block + np.int32(len(self.a.blocks))]),
             np.concatenate([a.pos, b.pos + self.shift]), np.concatenate([a.quat, b.quat]),
             np.concatenate([a.vel, b.vel]), np.concatenate([a.health, b.health]),
         )  # fmt: skip
+
+    @property
+    def columns(self) -> dict[str, PluginColumn]:
+        """Columns of plugins that were recorded of both runs, and those of one run whose names the other does not have."""
+        common = self.a.columns | self.b.columns
+        return {k: c for k, c in common.items() if self.a.columns.get(k, c) == self.b.columns.get(k, c)}
+
+    def values(self, i: int, name: str) -> np.ma.MaskedArray[Any, Any]:
+        """Return the values of a column of plugins at a time index, (n, k), in the order of the frame's ids; masked where there is none."""
+        parts = []
+        for run, pair in zip((self.a, self.b), self._pairs, strict=True):
+            n, k = int(run.counts[pair[i]]), len(self.columns[name].parts)
+            parts.append(run.values(int(pair[i]), name) if name in run.columns else np.ma.masked_all((n, k)))
+        return np.ma.concatenate(parts)
 
     @property
     def has_shapes(self) -> bool:
@@ -242,12 +283,15 @@ class Comparison:
 class _Both:
     """Style of two runs: the blocks of the second run follow those of the first, in paler colours."""
 
-    def __init__(self, a: Style, b: Style, n_first: int) -> None:
+    def __init__(self, a: Style, b: Style, n_first: int, team_shift: int, teams: list[int]) -> None:
         self._a, self._b, self._n = a, b, n_first
+        self._team_shift, self._teams = team_shift, teams
         self.notes = [*a.notes, *(note for note in b.notes if note not in a.notes)]
 
     def colour(self, team: int) -> Colour:
-        return self._a.colour(team)
+        return (
+            self._a.colour(team) if team in self._teams else _paler(self._b.colour(team - self._team_shift))
+        )
 
     def block_colour(self, block: int) -> Colour:
         if block < self._n:

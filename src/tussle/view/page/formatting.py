@@ -39,20 +39,26 @@ def number(value: Any) -> str:
 
 
 def result_rows(result: WorldResult, teams: Mapping[int, str]) -> list[Row]:
-    """Return names and values of the current metrics, without scores; teams by their names."""
+    """Return names and values of the results so far, without scores.
+
+    Args:
+        result: The results.
+        teams: Number -> name of each team.
+    """
     return [
-        (name.replace("_", " "), _by_team(value, teams) if isinstance(value, dict) else number(value))
-        for named in result.metrics.values()
+        (
+            f"{plugin} {name.replace('_', ' ')}",
+            _by_team(value, teams) if isinstance(value, dict) else number(value),
+        )
+        for plugin, named in result.metrics.items()
         for name, value in named.items()
         if name != "score"
     ]
 
 
 def _by_team(values: Mapping[Any, Any], teams: Mapping[int, str]) -> str:
-    return (
-        ", ".join(f"{teams.get(team) or f'team {team}'}: {number(value)}" for team, value in values.items())
-        or "–"
-    )
+    texts = [f"{teams.get(team) or f'team {team}'} {number(value)}" for team, value in values.items()]
+    return ", ".join(texts) or "–"
 
 
 def entity_sections(state: EntityState) -> list[tuple[str, list[Row]]]:

@@ -14,16 +14,18 @@ import numpy as np
 
 from tussle.errors import ParameterError
 from tussle.record.run_file import mission_entry
+from tussle.view.curves import numbers_of
 from tussle.view.frame import Event, Frame
 from tussle.view.live import Live
 from tussle.view.page.chunks import FULL_HEALTH, UNIT, pack, step_of
-from tussle.view.page.commands import LARGEST_ID, Command, game_commands, number, read_command, whole
+from tussle.view.page.commands import LARGEST_ID, WANTED, Command, game_commands, number, read_command, whole
 from tussle.view.page.document import event_rows
 from tussle.view.page.drawing import drawing_message
 from tussle.view.page.facts import mission_facts
 from tussle.view.page.failures import Failures
 from tussle.view.page.formatting import entity_sections, result_rows
 from tussle.view.page.packing import message
+from tussle.view.series import OF_TEAMS, Changes, CurveName, StepSeries
 
 if TYPE_CHECKING:
     from aiohttp.web import WebSocketResponse
@@ -38,6 +40,8 @@ MOST_MESSAGES = 200
 """From one browser in a second, and at once. More wait."""
 MOST_EVENTS = 2000
 """Of one message."""
+MOST_CHANGES = 5000
+"""Of one message; those of one quantity are sent together, at most as many as are kept."""
 REFUSAL_PERIOD = 1.0
 """Least time between two messages about refused values [s]."""
 PAST_FRAMES, PAST_STATES = 120, 60_000
@@ -66,6 +70,9 @@ class Reader:
         self.refusal: str | None = None
         self.refused_at = -REFUSAL_PERIOD
         self.events_sent: list[Event] = []
+        self.wanted: frozenset[tuple[str, int]] = frozenset()
+        self.changes_sent: dict[CurveName, tuple[StepSeries, int]] = {}
+        self.results_sent: list[str] = []
         self.free_at = 0.0
 
     def choose(self, id: int) -> None:  # noqa: A002 - as the page calls it
@@ -174,6 +181,8 @@ class FramePublisher:
         finally:
             self.readers.remove(reader)
             sender.cancel()
+            if reader.wanted:
+                self._watch()
 
     async def _send(self, reader: Reader) -> None:
         """Send what is new. A browser that takes nothing is waited for here, and misses what is made meanwhile."""
@@ -192,6 +201,10 @@ class FramePublisher:
                 if reader.drawn_sent != self._n_drawn:
                     reader.drawn_sent = self._n_drawn
                     await socket.send_bytes(self._drawn)
+                # Before the frame: the page has the counts of what it shows.
+                with self._failures.caught():
+                    if curves := self._new_curves(reader):
+                        await socket.send_str(json.dumps(curves))
                 if reader.frame_sent != self.n_made:
                     reader.frame_sent = self.n_made
                     await socket.send_bytes(self._frame)
@@ -210,7 +223,6 @@ class FramePublisher:
             "warp": None if math.isinf(warp) else warp, "reached": live.warp_reached,
             "rate": sum(now - moment <= 1.0 for moment in self._moments),
             "notes": [*live.notes, *self._drawing_notes, *self._failures.texts], "error": None if error is None else str(error),
-            "scores": {} if result is None else {str(k): float(v) for k, v in result.scores.items()},
             "metrics": [] if result is None else result_rows(result, live.teams), "events": self._new_events(reader),
             "entity": self._entity(reader), "refusal": refusal, "steers": self._may_steer(reader),
         }  # fmt: skip
@@ -225,9 +237,48 @@ class FramePublisher:
         reader.events_sent = events[: n + len(new)]
         return {"from": n, "rows": event_rows(new)}
 
+    def _new_curves(self, reader: Reader) -> dict[str, Any] | None:
+        """Return the changes that a browser does not have yet, of the quantities that it wants, and the names of all results."""
+        series = dict(self._live.curves.series)
+        results = sorted({q.name for q in series if not q.id and q.name not in OF_TEAMS})
+        has_names = results != reader.results_sent
+        reader.results_sent = results
+        changes: list[Changes] = []
+        for quantity, each in series.items():
+            if quantity.name not in OF_TEAMS and (quantity.name, quantity.id) not in reader.wanted:
+                continue
+            sent, n_sent = reader.changes_sent.get(quantity, (None, 0))
+            start, end = n_sent if sent is each else 0, len(each.values)
+            if (start == end and sent is each) or sum(len(c.t) for c in changes) > MOST_CHANGES:
+                continue
+            reader.changes_sent[quantity] = each, end
+            t = [self._live.time_of(step) for step in each.steps[start:end]]
+            changes.append(Changes(quantity, start, t, each.values[start:end]))
+        if not changes and not has_names:
+            return None
+        return {"kind": "curves", "results": results, "changes": [each.document() for each in changes]}
+
+    def _want(self, reader: Reader, wanted: list[tuple[str, int]]) -> None:
+        """Send these results (id 0) and columns of entities to a browser."""
+        reader.wanted = frozenset((name, who) for name, who in wanted)
+        reader.changes_sent = {
+            q: sent
+            for q, sent in reader.changes_sent.items()
+            if (q.name, q.id) in reader.wanted or q.name in OF_TEAMS
+        }
+        self._watch()
+
+    def _watch(self) -> None:
+        self._live.watch(
+            {CurveName(name, None, who) for each in self.readers for name, who in each.wanted if who}
+        )
+
     def _entity(self, reader: Reader) -> dict[str, Any] | None:
         state = self._live.entity(reader.chosen) if reader.chosen else None
-        return None if state is None else {"id": state.id, "sections": entity_sections(state)}
+        if state is None:
+            return None
+        quantities = [[name, unit] for name, (_, unit) in numbers_of(state).items()]
+        return {"id": state.id, "sections": entity_sections(state), "quantities": quantities}
 
     # -- what they send ---------------------------------------------------------------------------------------------------------------
 
@@ -238,6 +289,7 @@ class FramePublisher:
         """Execute the command of a browser; ignore invalid ones."""
         commands = self._commands | {
             "choose": Command(reader.choose, {"id": whole(0, LARGEST_ID)}, steers=False),
+            "want": Command(lambda wanted: self._want(reader, wanted), {"wanted": WANTED}, steers=False),
             "history": Command(
                 lambda seconds: self._look_back(reader, seconds), {"seconds": number(0.0, 1e9)}, steers=False
             ),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import struct
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,8 @@ from tussle.view.page.compare import Comparison
 from tussle.view.page.document import event_rows, game_document, scenery_blobs
 from tussle.view.page.drawing import drawing_message
 from tussle.view.page.facts import mission_facts
-from tussle.view.page.packing import message, reals
+from tussle.view.page.packing import ints, message, reals
+from tussle.view.page.recorded_curves import COLUMNS, column_changes, run_changes
 from tussle.view.recording import Recording
 
 FILE_STATES, FILE_FRAMES = 150_000, 32
@@ -26,8 +28,6 @@ SERVED_STATES, SERVED_FRAMES = 20_000, 4
 """Of a chunk that is served: some hundredths of a second of work for both ends, so that a jump in time is not felt."""
 MOST_FRAMES = 1024
 """Frames of a chunk: with more a page has to read too much before it shows anything."""
-CURVE_POINTS = 240
-"""Moments at which entities are counted for the curves of the teams."""
 SHAPE_FRAMES = 64
 """Frames whose shapes are read at once."""
 LEAP_OF_EXTENT = 0.25
@@ -84,10 +84,12 @@ class RecordedData:
         self._scenery = scenery_blobs(game.scenery)
 
     @property
-    def n_entities(self) -> int:
-        """Number of entities over the whole run."""
-        first = set(self._game.frame(0).id.tolist())
-        return len(first | {event.id for event in self._game.events if event.kind == "birth"})
+    def n_entities(self) -> list[int]:
+        """Number of entities over each whole run."""
+        return [
+            len({*run.frame(0).id.tolist(), *(event.id for event in run.events if event.kind == "birth")})
+            for run, _, _ in self._runs
+        ]
 
     def document(self, **more: Any) -> dict[str, Any]:
         """Return the document.
@@ -103,12 +105,19 @@ class RecordedData:
                 f"{len(self.kept):,}"
                 + (f" of {len(game.t):,}, one every {self._period:g} s" if self._period else ""),
             ),
-            ("Entities", f"{self.n_entities:,}, in {int(self.counts.sum()):,} states"),
+            (
+                "Entities",
+                f"{' and '.join(f'{n:,}' for n in self.n_entities)}, in {int(self.counts.sum()):,} states",
+            ),
         ]
+        if isinstance(game, Comparison):
+            more |= {"runs": comparison_data(game), "shift": game.shift.tolist(), "signs": game.signs}
+            more |= {"differing": game.differing}
         return {
             **game_document(game, self._mission, self._viewer, self._title),
             "source": "embedded" if self._is_file else "range",
             "facts": facts,
+            "quantities": [] if self._is_file else list(COLUMNS.items()),
             "idShift": game.id_shift,
             "isComplete": game.is_complete,
             "nFrames": len(self.kept),
@@ -121,19 +130,23 @@ class RecordedData:
             "angleError": ANGLE_ERROR,
             "chunks": self.chunks,
             "shapeFrames": SHAPE_FRAMES if game.has_shapes else 0,
-            "curves": self._curves(),
+            "columns": [
+                {
+                    "name": column.name,
+                    "kind": column.dtype.__name__,
+                    "fields": list(column.fields),
+                    "units": list(column.units),
+                    "doc": column.doc,
+                }
+                for column in game.columns.values()
+            ],
             **more,
         }
 
-    def _curves(self) -> dict[str, Any]:
-        """Entities of each team over time."""
-        places = np.unique(np.linspace(0, len(self.kept) - 1, CURVE_POINTS).round().astype(np.int64))
-        teams = list(self._game.teams)
-        rows = [self._game.frame(int(self.kept[i])).team for i in places]
-        return {
-            "t": self._game.t[self.kept[places]].tolist(),
-            "n": [[int((row == team).sum()) for row in rows] for team in teams],
-        }
+    def _curves(self) -> bytes:
+        """Entities left and born, captures, scores and results, of each run over time."""
+        parts = (run_changes(*run) for run in self._runs)
+        return compact_json([each.document() for changes in parts for each in changes]).encode()
 
     @property
     def names(self) -> list[str]:
@@ -142,10 +155,16 @@ class RecordedData:
         return [
             "times",
             "events",
+            "curves",
             *self._scenery,
             *chunks,
+            *(f"columns-{i}" for i in range(self._n_column_blobs)),
             *(f"shapes-{i}" for i in range(self._n_shape_blobs)),
         ]
+
+    @property
+    def _n_column_blobs(self) -> int:
+        return len(self.chunks) if self._game.columns else 0
 
     @property
     def _n_shape_blobs(self) -> int:
@@ -157,17 +176,55 @@ class RecordedData:
             return reals(self._game.t[self.kept])
         if name == "events":
             return compact_json(event_rows(self._game.events)).encode()
+        if name == "curves":
+            return self._curves()
         if name in self._scenery:
             return self._scenery[name]
         kind, _, number = name.partition("-")
-        n_blobs = {"chunk": len(self.chunks), "shapes": self._n_shape_blobs}.get(kind, 0)
+        if kind == "column" and not self._is_file:
+            return self._column(*number.partition("-")[::2])
+        n_blobs = {
+            "chunk": len(self.chunks),
+            "columns": self._n_column_blobs,
+            "shapes": self._n_shape_blobs,
+        }.get(kind, 0)
         if not number.isdecimal() or len(number) > 9 or int(number) >= n_blobs:
             return None
         if kind == "shapes":
             return self._shapes(int(number) * SHAPE_FRAMES)
         first, last = self.chunks[int(number)]
-        frames = [self._game.frame(int(i)) for i in self.kept[first : last + 1]]
-        return pack(first, frames, self.step, self._leap)
+        kept = self.kept[first : last + 1].tolist()
+        if kind == "columns":
+            return self._columns(kept)
+        return pack(first, [self._game.frame(i) for i in kept], self.step, self._leap)
+
+    def _columns(self, numbers: Sequence[int]) -> bytes:
+        """Columns of plugins in some frames.
+
+        `ints` of the entities of each frame, and of all ids, frame after frame; then for each component of each column the `reals` of these
+        entities, NaN where one does not have the column.
+        """
+        ids = [self._game.frame(i).id for i in numbers]
+        parts = [ints(np.array([len(each) for each in ids])), ints(np.concatenate(ids))]
+        for name in self._game.columns:
+            values = np.ma.concatenate([self._game.values(i, name) for i in numbers])
+            parts += [reals(component) for component in values.astype(float).filled(np.nan).T]
+        return b"".join(parts)
+
+    @property
+    def _runs(self) -> list[tuple[Recording, int, int]]:
+        """Each run, and what is added to the numbers of its teams and of its entities."""
+        game = self._game
+        if isinstance(game, Comparison):
+            return [(game.a, 0, 0), (game.b, game.team_shift, game.id_shift)]
+        return [(game, 0, 0)]
+
+    def _column(self, who: str, column: str) -> bytes | None:
+        """Changes of a column of an entity, in each run that has it."""
+        if not who.isdecimal() or len(who) > 9 or column not in COLUMNS:
+            return None
+        changes = [column_changes(run, int(who), column, id_shift) for run, _, id_shift in self._runs]
+        return compact_json([each.document() for each in changes if each.t]).encode()
 
     def _shapes(self, first: int) -> bytes:
         """Shapes of `SHAPE_FRAMES` frames: frame and length of each message, then the message; of equal ones only the first."""
@@ -215,11 +272,25 @@ def chunk_bounds(counts: np.ndarray, n_states: int, least_frames: int) -> list[t
     return bounds
 
 
+def comparison_data(game: Comparison) -> list[dict[str, Any]]:
+    """Return name, directory, teams and what their numbers have been raised by, of each of two runs."""
+    return [
+        {
+            "name": name,
+            "title": run.path.resolve().name,
+            "teams": [team + shift for team in run.teams],
+            "teamShift": shift,
+        }
+        for name, run, shift in (("A", game.a, 0), ("B", game.b, game.team_shift))
+    ]
+
+
 def game_facts(game: Recording | Comparison) -> list[tuple[str, str]]:
     """Return names and values of the facts panel."""
     if isinstance(game, Comparison):
         both = (("A", game.a), ("B", game.b))
-        return [(f"{name}: {key}", value) for name, run in both for key, value in game_facts(run)]
+        settings = [(path, f"A {a}, B {b}") for path, a, b in game.differing]
+        return settings + [(f"{name}: {key}", value) for name, run in both for key, value in game_facts(run)]
     info, t = game.run.info, game.t
     named = lambda team: game.teams.get(int(team)) or f"team {team}"  # noqa: E731
     worlds = info.get("worlds", [])

@@ -4,6 +4,7 @@ Each is a function of the chosen part of a recording that gives a Matplotlib fig
 writes several into files.
 """
 
+from tussle.view.plots.columns import column, column_of_runs, runs_of
 from tussle.view.plots.counts import captures, left
 from tussle.view.plots.curves import altitude, distance, speed
 from tussle.view.plots.files import KINDS, Plots, write_plots
@@ -19,10 +20,13 @@ __all__ = [
     "Trajectories",
     "altitude",
     "captures",
+    "column",
+    "column_of_runs",
     "density",
     "distance",
     "left",
     "plot_style",
+    "runs_of",
     "speed",
     "trajectory",
     "trajectory3d",

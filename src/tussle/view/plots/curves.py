@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
@@ -28,12 +29,12 @@ MOST_TIMES = 400
 
 def speed(tracks: Trajectories) -> Figure:
     """Speed over time: a line for each entity, a band of quantiles for a team of many."""
-    return _over_time(tracks, tracks.speed, "Speed", "speed [m/s]")
+    return over_time(tracks, {"speed [m/s]": tracks.speed}, "Speed")
 
 
 def altitude(tracks: Trajectories) -> Figure:
     """Altitude over time: a line for each entity, a band of quantiles for a team of many."""
-    return _over_time(tracks, tracks.column("z"), "Altitude", "altitude [m]")
+    return over_time(tracks, {"altitude [m]": tracks.column("z")}, "Altitude")
 
 
 def distance(recording: Recording, one: int, other: int, selection: Selection | None = None) -> Figure:
@@ -94,17 +95,21 @@ def _apart(tracks: Trajectories, one: int, other: int) -> tuple[np.ndarray, np.n
     return both, np.linalg.norm(pos[first][mine] - pos[second][its], axis=1)
 
 
-def _over_time(tracks: Trajectories, values: np.ndarray, what: str, label: str) -> Figure:
-    figure = sheet(2.5)
-    axes: Any = figure.subplots()
-    if tracks.selection.entities and len(tracks) <= len(COLOURS):
-        signs = _named_lines(axes, tracks, values)
-    else:
-        signs = _teams_over_time(axes, tracks, values)
-    axes.set_ylabel(label)
-    axes.margins(y=0.08)
-    time_axis(axes, tracks.frame_times)
-    rule_y(axes)
+def over_time(tracks: Trajectories, values: Mapping[str, np.ndarray], what: str) -> Figure:
+    """Values of the states over time, (m,), one below the other with their labels; NaN where there is none."""
+    figure = sheet(2.5 * len(values))
+    signs: list[Handle] = []
+    for axes, (label, each) in zip(
+        np.atleast_1d(figure.subplots(len(values), sharex=True)), values.items(), strict=True
+    ):
+        if tracks.selection.entities and len(tracks) <= len(COLOURS):
+            signs = _named_lines(axes, tracks, each)
+        else:
+            signs = _teams_over_time(axes, tracks, each)
+        axes.set_ylabel(label)
+        axes.margins(y=0.08)
+        time_axis(axes, tracks.frame_times)
+        rule_y(axes)
     add_head(figure, tracks, what, signs)
     return figure
 
@@ -132,8 +137,7 @@ def _teams_over_time(axes: Axes, tracks: Trajectories, values: np.ndarray) -> li
             _cross(axes, tracks, values, who, rows, tracks.colours[team])
     signs = [(line_sign(**line_look(tracks, team)), name) for team, name in tracks.teams.items()]
     if many:
-        shades = (mixed(MUTED, PAPER, 0.45), mixed(MUTED, PAPER, 0.75))
-        signs += [(line_sign(shades[0], 5.0), "half of a team"), (line_sign(shades[1], 5.0), "90 % of it")]
+        signs += band_signs("a team", "it")
     is_marked = any(who in tracks.deaths and team not in many for who, team, _ in tracks.each())
     return signs + (_death_sign(tracks) if is_marked else [])
 
@@ -163,12 +167,24 @@ def _band(axes: Axes, tracks: Trajectories, values: np.ndarray, team: int) -> No
     order = np.argsort(tracks.frame[mine], kind="stable")
     frame, found = tracks.frame[mine][order], values[mine][order]
     edges = np.searchsorted(frame, [*frames, len(tracks.frame_times)])
-    shares = [0.05, 0.25, 0.5, 0.75, 0.95]
-    bands = np.full((len(shares), len(frames)), np.nan)
+    samples = np.full((int(np.diff(edges).max(initial=0)), len(frames)), np.nan)
     for i, (begin, end) in enumerate(pairwise(edges)):
-        if end > begin:
-            bands[:, i] = np.quantile(found[begin:end], shares)
-    t, colour = tracks.frame_times[frames], tracks.colours[team]
+        samples[: end - begin, i] = found[begin:end]
+    draw_bands(axes, tracks, tracks.frame_times[frames], samples, team)
+
+
+def band_signs(of: str, it: str) -> list[Handle]:
+    """What the shades of a band mean."""
+    shades = (mixed(MUTED, PAPER, 0.45), mixed(MUTED, PAPER, 0.75))
+    return [(line_sign(shades[0], 5.0), f"half of {of}"), (line_sign(shades[1], 5.0), f"90 % of {it}")]
+
+
+def draw_bands(axes: Axes, tracks: Trajectories, t: np.ndarray, samples: np.ndarray, team: int) -> None:
+    """Median, middle half and middle nine tenths of samples, (n, T), NaN where there is none, at times [s], (T,)."""
+    bands = np.full((5, len(t)), np.nan)
+    has_some = np.isfinite(samples).any(axis=0)
+    bands[:, has_some] = np.nanquantile(samples[:, has_some], [0.05, 0.25, 0.5, 0.75, 0.95], axis=0)
+    colour = tracks.colours[team]
     axes.fill_between(t, bands[0], bands[4], color=colour, alpha=0.16, linewidth=0)
     axes.fill_between(t, bands[1], bands[3], color=colour, alpha=0.3, linewidth=0)
     axes.plot(t, bands[2], **line_look(tracks, team))

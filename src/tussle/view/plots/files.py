@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tussle.errors import ParameterError, ViewError, listed, nearest_name
+from tussle.view.plots.columns import column, column_of_runs, parts_of
 from tussle.view.plots.counts import captures, has_captures, left
 from tussle.view.plots.curves import altitude, distance, speed
 from tussle.view.plots.maps import MAX_TRAJECTORIES, density, trajectory, trajectory3d
@@ -56,16 +57,20 @@ def write_plots(
     selection: Selection | None = None,
     between: tuple[int, int] | None = None,
     form: str = "png",
+    columns: Sequence[str] = (),
+    others: Sequence[Recording] = (),
 ) -> Plots:
     """Write plots of a recording, one file each; the same recording gives the same bytes.
 
     Args:
         recording: The recorded run.
         directory: Directory of the files; made if it does not exist.
-        kinds: Plots, of `KINDS`; by default the distance if two entities are given, else all that have data.
+        kinds: Plots, of `KINDS`; by default the distance if two entities are given, else all that have data, unless columns are given.
         selection: Entities and times.
         between: Ids of the two whose distance is plotted.
         form: "png", "svg" or "pdf".
+        columns: Columns that are plotted over time, see `tussle.view.plots.columns.column`.
+        others: Further runs, whose columns are plotted with those of the first as means of each run.
 
     Raises:
         ParameterError: A plot, format, team or entity does not exist, or the selection is empty.
@@ -73,12 +78,19 @@ def write_plots(
         MissingExtraError: Matplotlib is not installed.
     """
     _check(kinds, between, form)
+    if others and (kinds or between or not columns):
+        raise ParameterError(
+            "of several runs only columns are plotted: give at least one, and no other plots"
+        )
+    for each in (recording, *others):
+        for name in columns:
+            parts_of(each, name)
     chosen = selection or Selection()
-    is_all = not kinds and between is None
-    names = list(dict.fromkeys(kinds)) or ([DISTANCE] if between else list(PLOTS))
+    is_all = not kinds and between is None and not columns
+    names = list(dict.fromkeys(kinds)) or ([DISTANCE] if between else list(PLOTS) if is_all else [])
     notes: list[str] = []
     with plot_style():
-        tracks = Trajectories(recording, chosen) if names != [DISTANCE] else None
+        tracks = Trajectories(recording, chosen) if set(names) - {DISTANCE} else None
         if is_all and tracks is not None:
             names, notes = _with_data(tracks)
         place = Path(directory)
@@ -87,6 +99,15 @@ def write_plots(
         except OSError as error:
             raise ViewError(f"{place}: the plots cannot be written: {error.strerror or error}") from error
         files, missing = [], set()
+        world = f"-world-{recording.world}" if recording.world else ""
+        for name in dict.fromkeys(columns):
+            figure = (
+                column_of_runs([recording, *others], name, chosen)
+                if others
+                else column(recording, name, chosen)
+            )
+            files.append(place / f"{name.replace('/', '_')}{world}.{form}")
+            missing |= set(save(figure, files[-1], form))
         for name in names:
             if name == DISTANCE:
                 assert between is not None
@@ -94,7 +115,6 @@ def write_plots(
             else:
                 assert tracks is not None
                 figure, suffix = PLOTS[name](tracks), ""
-            world = f"-world-{recording.world}" if recording.world else ""
             files.append(place / f"{name}{suffix}{world}.{form}")
             missing |= set(save(figure, files[-1], form))
     if tracks is not None:

@@ -73,7 +73,7 @@ class Trajectories:
         return len(self.who)
 
     def column(self, name: str) -> np.ndarray:
-        """A column of the trajectory table for the selected states, (m,)."""
+        """A column of the trajectory table for the selected states, (m,); one of a plugin as real numbers, NaN where there is none."""
         return self._column(name)[self._rows]
 
     def pos(self, axes: str = "xyz") -> np.ndarray:
@@ -141,7 +141,8 @@ class Trajectories:
     # -- reading the tables -----------------------------------------------------------------------------------------------------
 
     def _column(self, name: str) -> np.ndarray:
-        return np.asarray(self.recording.run.trajectory_table[name].to_numpy())
+        values = self.recording.run.trajectory_table[name].to_numpy()
+        return np.asarray(values, float if name in self.recording.parts else None)
 
     def _span(self) -> tuple[int, int]:
         """Numbers of the first frame of the span and of the first after it."""

@@ -59,14 +59,21 @@ def sheet(height: float) -> Figure:
     return Figure(figsize=(WIDTH, height), layout="compressed")  # maps keep close to their scales and legends
 
 
-def add_head(figure: Figure, tracks: Trajectories, what: str, handles: Sequence[Handle] = ()) -> None:
+def add_head(
+    figure: Figure,
+    tracks: Trajectories,
+    what: str,
+    handles: Sequence[Handle] = (),
+    *,
+    has_seed: bool = True,
+) -> None:
     """Write title and legend over the axes; the figure grows by their lines."""
     from matplotlib.legend_handler import HandlerTuple
 
     names = [shortened(name, 30) for _, name in handles]
     widths = [6 + len(name) for name in names]
     n_columns = max(1, len(names)) if sum(widths) <= LETTERS else max(1, LETTERS // max(widths))
-    title = _wrapped(f"{what} · {_game(tracks)}")
+    title = _wrapped(f"{what} · {_game(tracks, has_seed)}")
     n_lines = title.count("\n") + -(-len(names) // n_columns)
     figure.set_figheight(figure.get_figheight() + 0.2 + 0.17 * n_lines)
     legend = figure.legend(
@@ -77,11 +84,11 @@ def add_head(figure: Figure, tracks: Trajectories, what: str, handles: Sequence[
     legend.get_title().set_fontsize(8)
 
 
-def _game(tracks: Trajectories) -> str:
-    """Name, world and seed of the game."""
+def _game(tracks: Trajectories, has_seed: bool) -> str:
+    """Name, world and, unless it is of several runs, seed of the game."""
     recording = tracks.recording
     worlds = recording.run.info.get("worlds", ())
-    seed = f", seed {worlds[recording.world]['seed']}" if recording.world < len(worlds) else ""
+    seed = f", seed {worlds[recording.world]['seed']}" if has_seed and recording.world < len(worlds) else ""
     about = f", world {recording.world}{seed}" if len(worlds) > 1 else seed
     return printable(recording.name)[:MAX_NAME] + about
 

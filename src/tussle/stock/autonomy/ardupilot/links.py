@@ -30,6 +30,7 @@ class UdpLink(AutopilotLink):
         lockstep: Whether each state is answered.
         timeout: Longest wait for an answer [s].
         resend_period: Time after which a state that has no answer is sent again [s].
+        may_restart: Whether it goes on with an autopilot that has started anew.
         release: Called after the connection has been closed.
     """
 
@@ -40,9 +41,12 @@ class UdpLink(AutopilotLink):
         lockstep: bool,
         timeout: float,
         resend_period: float,
+        may_restart: bool,
         release: Callable[[], object],
     ) -> None:
         super().__init__(autopilot, lockstep, timeout, release)
+        self._may_restart = may_restart
+        self._former: set[tuple[str, int]] = set()
         self._in, self._resend_period = socket_, resend_period
         self._state, self._sent = b"", 0.0
         self._peer: tuple[str, int] | None = None
@@ -82,6 +86,11 @@ class UdpLink(AutopilotLink):
             return
         if self._peer is None:
             self._peer = place
+        elif place != self._peer and self._has_replaced(frame, place):
+            self._former.add(self._peer)
+            self._peer = place
+            self._restart(frame)
+            return
         elif place != self._peer:
             self.fail(
                 f"a second autopilot, at {_at(place)}, sends to the port of the one at {_at(self._peer)}"
@@ -113,6 +122,15 @@ class UdpLink(AutopilotLink):
             self._is_unheard = True
         except OSError as error:
             self.fail(f"nothing can be sent: {error.strerror}")
+
+    def _has_replaced(self, frame: wire.ServoFrame, place: tuple[str, int]) -> bool:
+        """Whether a packet from another place is of an autopilot that has started anew, with which the vehicle goes on."""
+        return self._may_restart and place not in self._former
+
+    def _restart(self, frame: wire.ServoFrame) -> None:
+        """Go on with an autopilot that has started anew: its vehicle has no commands until a state is answered."""
+        self.hear()
+        self.commands, self.has_restarted, self.is_done = {}, True, True
 
     @abstractmethod
     def _is_stranger(self, place: tuple[str, int]) -> bool:
@@ -146,11 +164,12 @@ class ScrimmageLink(UdpLink):
         lockstep: bool,
         timeout: float,
         resend_period: float,
+        may_restart: bool,
         release: Callable[[], object],
     ) -> None:
         received = bound(socket.SOCK_DGRAM, listen, from_port, "from_ardupilot_port")
         where = f"ArduPilot at {address}:{to_port}, servo packets at port {from_port}"
-        super().__init__(where, received, lockstep, timeout, resend_period, release)
+        super().__init__(where, received, lockstep, timeout, resend_period, may_restart, release)
         self._address = address
         self._out = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._out.setblocking(False)
@@ -167,9 +186,11 @@ class ScrimmageLink(UdpLink):
         """Send the state."""
         self._n_packets = 0
         self.receive()
-        self.is_done = not self.lockstep
+        # One that has started anew gets the state only when its vehicle has been put back.
+        self.is_done = self.has_restarted or not self.lockstep
         self._state = wire.encode_state(state)
-        self._send()
+        if not self.has_restarted:
+            self._send()
 
     def receive(self) -> None:
         """Read all packets, and whether nobody listens to the states."""
@@ -207,7 +228,8 @@ class ScrimmageLink(UdpLink):
 class JsonLink(UdpLink):
     """The protocol "json": ArduPilot sends numbered frames to a port of tussle, and gets states from there.
 
-    The first frame tells where ArduPilot is. A frame with a higher number answers the state.
+    The first frame tells where ArduPilot is. A frame with a higher number answers the state. One with a lower number is of an
+    ArduPilot that has started anew, perhaps at another place: that is a failure, or with `may_restart` the next state is answered.
     """
 
     def __init__(
@@ -217,11 +239,12 @@ class JsonLink(UdpLink):
         lockstep: bool,
         timeout: float,
         resend_period: float,
+        may_restart: bool,
         release: Callable[[], object],
     ) -> None:
         received = bound(socket.SOCK_DGRAM, listen, port, "json_port")
         where = f"ArduPilot that sends to {listen}:{port}"
-        super().__init__(where, received, lockstep, timeout, resend_period, release)
+        super().__init__(where, received, lockstep, timeout, resend_period, may_restart, release)
         self._number = -1
 
     def begin(self, state: VehicleState, draws: Sequence[float] = ()) -> None:
@@ -229,9 +252,16 @@ class JsonLink(UdpLink):
         self._n_packets = 0
         self.receive()  # before the state is there, so that it is not sent twice
         self._state = wire.encode_json(state)
-        self.is_done = self._peer is not None and not self.lockstep
-        if self._peer:
+        self.is_done = self.has_restarted or (self._peer is not None and not self.lockstep)
+        if self._peer and not self.has_restarted:
             self._send()
+
+    def _has_replaced(self, frame: wire.ServoFrame, place: tuple[str, int]) -> bool:
+        return super()._has_replaced(frame, place) and frame.number < self._number
+
+    def _restart(self, frame: wire.ServoFrame) -> None:
+        super()._restart(frame)
+        self._number = frame.number
 
     def _is_stranger(self, place: tuple[str, int]) -> bool:
         return False
@@ -240,7 +270,9 @@ class JsonLink(UdpLink):
         return wire.decode_frame(data)
 
     def _take(self, frame: wire.ServoFrame) -> None:
-        if frame.number < self._number:
+        if frame.number < self._number and self._may_restart:
+            self._restart(frame)
+        elif frame.number < self._number:
             self.fail(f"it has started anew: its frame {frame.number} came after {self._number}")
         elif frame.number > self._number:
             self._number = frame.number

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from tussle.api import HistoricAttributes, Param
+import numpy as np
+
+from tussle.api import GroupView, HistoricAttributes, Param, State
 from tussle.api.channel_map import ChannelMapParam
 from tussle.autopilots.link import MOST_PORT, resolved
 from tussle.autopilots.plugin import Autopilot
@@ -26,8 +28,9 @@ class ArduPilot(Autopilot):
     `servo_map` is [channel output pulse_min pulse_max channel_min channel_max factor], outputs counted from 0. An output without pulses
     gives 0. With the protocol "scrimmage" states go to to_ardupilot_port, and servo packets come to from_ardupilot_port; with
     ardupilot_port_base, servo packets come to that port + port_instance_multiplier times the id, and states go to the next port. With
-    "json" ArduPilot sends to json_port + port_instance_multiplier times (id - 1), and is answered there. See
-    [Autopilots](../autopilots.md).
+    "json" ArduPilot sends to json_port + port_instance_multiplier times (id - 1), and is answered there. With `on_restart` "reset", an
+    ArduPilot that starts anew, as the numbers of its frames or its own port tell, finds its vehicle as it was at birth; `restarts`
+    counts. See [Autopilots](../autopilots.md).
 
     Differences from SCRIMMAGE: it waits for the answer to each state, where `asynchronous_mode` was the default, and sends states
     again; an autopilot that is silent ends the world; servo packets are taken from to_ardupilot_ip only, at 127.0.0.1 unless listen_ip
@@ -84,6 +87,27 @@ class ArduPilot(Autopilot):
         doc="Time after which a state without an answer is sent again.",
     )
 
+    on_restart = Param(
+        "end",
+        choices=("end", "reset"),
+        structural=True,
+        doc="What happens when ArduPilot starts anew: the world ends, or the vehicle is where it began.",
+    )
+    start_pose = State("x y z qw qx qy qz", unit="m m m 1 1 1 1", doc="Position and attitude at birth.")
+    start_vel = State("x y z wx wy wz", unit="m/s m/s m/s rad/s rad/s rad/s", doc="Velocities at birth.")
+
+    def begin(self, g: GroupView, rows: np.ndarray) -> None:
+        """Store the states of newborn vehicles."""
+        born = g.first + rows
+        self.start_pose[:, rows] = np.concatenate([g.bodies.pos[:, born], g.bodies.quat[:, born]])
+        self.start_vel[:, rows] = np.concatenate([g.bodies.vel[:, born], g.bodies.omega[:, born]])
+
+    def restart(self, g: GroupView, row: int) -> None:
+        """Put the vehicle where it began."""
+        pose, vel = self.start_pose[:, row], self.start_vel[:, row]
+        g.context.move(g.first + row, pos=pose[:3], quat=pose[3:], vel=vel[:3], omega=vel[3:])
+        self.last_vel[:, row] = vel[:3]
+
     def channel_map(self) -> str:
         """The rows that map outputs to channels."""
         return str(self.servo_map)
@@ -104,7 +128,8 @@ class ArduPilot(Autopilot):
         shift = own["world_step"] * row.world
         ports = [port + shift for port in ((json_port,) if is_json else (to_port, from_port))]
         release = self.claim(row, ports, OF_JSON if is_json else OF_SCRIMMAGE)
-        how = own["lockstep"], own["timeout"], own["resend_period"], release
+        may_restart = own["on_restart"] == "reset"
+        how = own["lockstep"], own["timeout"], own["resend_period"], may_restart, release
         try:
             if is_json:
                 return JsonLink(ports[0], listen, *how)

@@ -66,7 +66,7 @@ def encode_json(state: VehicleState) -> bytes:
     """A state, by the protocol "json"."""
     said = {
         "timestamp": state.t, "imu": {"gyro": state.rate, "accel_body": state.force}, "position": state.position,
-        "quaternion": state.quat, "velocity": state.velocity,
+        "attitude": state.euler, "quaternion": state.quat, "velocity": state.velocity,
     }  # fmt: skip
     return f"\n{json.dumps(said, separators=(',', ':'))}\n".encode()
 

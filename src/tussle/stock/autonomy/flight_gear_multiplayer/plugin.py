@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import socket
 from functools import partial
+from itertools import chain, count
 
 import numpy as np
 
@@ -29,7 +30,12 @@ MOST_CALLSIGN, MOST_MODEL = 7, 95
 
 
 class Senders:
-    """The socket of a simulation, and the id of the entity that has a callsign as it is."""
+    """The socket of a simulation, and the callsigns of its entities.
+
+    Attributes:
+        place: Address and port to which packets go.
+        socket: The socket.
+    """
 
     def __init__(self, address: str, port: int) -> None:
         try:
@@ -39,7 +45,16 @@ class Senders:
                 f"FlightGearMultiplayer: server_ip = {address!r} is no known host: {reason}"
             ) from None
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self.owners: dict[str, int] = {}
+        self._callsigns: dict[int, str] = {}
+        self._taken: set[str] = set()
+
+    def callsign(self, id_: int, given: str) -> bytes:
+        """The callsign of an entity, which no other one has: as it is given, or with the id, else the next free number, at its end."""
+        if id_ not in self._callsigns:
+            numbered = (f"{given[: MOST_CALLSIGN - len(str(k))]}{k}" for k in chain([id_], count(1)))
+            self._callsigns[id_] = next(each for each in chain([given], numbered) if each not in self._taken)
+            self._taken.add(self._callsigns[id_])
+        return self._callsigns[id_].encode()
 
     def end(self) -> None:
         """Close the socket; called when the simulation is closed."""
@@ -50,8 +65,8 @@ class FlightGearMultiplayer(Autonomy):
     """Sends the entity to a FlightGear, or to a server of its multiplayer protocol, which shows it as the aircraft of another player.
 
     One packet per call, by UDP; FlightGear itself sends ten in a second (`rate="10"`). It expects that simulated time passes as the
-    clock does. The first entity with a callsign has it as it is, the others with their id at its end. In a stack of worlds,
-    those of the first one are sent.
+    clock does. The first entity with a callsign has it as it is, the others with their id at its end, or the next number that nobody
+    has. In a stack of worlds, those of the first one are sent.
 
     Differences from the existing system: velocities are sent, there 0; the callsign has the id, there all of a block have one; the
     lag is 0, there the time.
@@ -101,15 +116,10 @@ class FlightGearMultiplayer(Autonomy):
         out = np.zeros(len(rows), LAYOUT)
         out["magic"], out["protocol"], out["message"] = MAGIC, PROTOCOL, POSITION
         out["length"], out["range"] = LAYOUT.itemsize, RANGE
-        out["callsign"] = [self._callsign(int(id_), senders) for id_ in g.id[rows]]
+        out["callsign"] = [senders.callsign(int(id_), self.callsign) for id_ in g.id[rows]]
         out["model"], out["time"] = self.aircraft_model.encode(), g.t[rows]
         out["position"] = origin.to_earth_centred(g.pos[:, rows]).T
         out["orientation"] = (2.0 * half * unit(attitude[1:])).T
         out["velocity"] = to_forward_right_down(quat, g.vel[:, rows]).T
         out["angular_velocity"] = to_forward_right_down(quat, g.omega[:, rows]).T
         return out
-
-    def _callsign(self, id_: int, senders: Senders) -> bytes:
-        if senders.owners.setdefault(self.callsign, id_) == id_:
-            return str(self.callsign).encode()
-        return f"{self.callsign[: MOST_CALLSIGN - len(str(id_))]}{id_}".encode()

@@ -23,6 +23,10 @@ MOST_PER_SECOND = 2000
 CLOSED = "the connection was closed"
 
 
+class ConnectionLostError(ConnectionError):
+    """The MOOSDB has ended the connection, or has gone."""
+
+
 class MoosClient:
     """A client of a MOOSDB, whose mail is read by a thread of its own, so that it is read while a simulation is paused; see `start`.
 
@@ -34,11 +38,14 @@ class MoosClient:
         variables: Variables whose values are sent to this client.
         timeout: Longest wait for a MOOSDB that does not read what is sent [s].
         receive: Called by the thread for each message of mail, while it holds `changed`.
+        lose: Called by the thread when the connection is lost, while it holds `changed`; it then connects anew. None ends with the
+            connection.
 
     Attributes:
         community: Name of the community; empty while it is unknown.
-        trouble: Why there is no connection yet; empty once there has been one.
-        failure: Why there is no connection any more; empty if all is well.
+        trouble: Why there is no connection; empty while there is one.
+        n_lost: How often the connection was lost.
+        failure: Why there will be no connection any more; empty if all is well.
         changed: Notified after mail and failures.
     """
 
@@ -51,11 +58,13 @@ class MoosClient:
         variables: Iterable[str],
         timeout: float,
         receive: Callable[[wire.MoosMessage], None],
+        lose: Callable[[], None] | None = None,
     ) -> None:
         self.host, self.port, self.name, self.community = host, port, name, community
-        self.trouble, self.failure = "no answer", ""
+        self.trouble, self.failure, self.n_lost = "no answer", "", 0
         self.changed = threading.Condition()
-        self._variables, self._timeout, self._receive = tuple(variables), timeout, receive
+        self._variables, self._timeout = tuple(variables), timeout
+        self._receive, self._lose = receive, lose
         self._socket: socket.socket | None = None
         self._received = bytearray()
         self._sending = threading.Lock()
@@ -99,26 +108,33 @@ class MoosClient:
         return wire.joined(self._heads[1], tail)
 
     def send(self, messages: list[bytes]) -> None:
-        """Send a packet. An error ends the connection."""
-        if self._socket and not self.failure:
+        """Send a packet. An error ends the connection; without one, nothing is sent."""
+        if self._socket and not (self.failure or self.trouble):
             try:
                 with self._sending:
                     self._socket.sendall(wire.packet(messages))
             except OSError as error:
-                self.fail(f"nothing can be sent: {error.strerror or error}")
+                if self._lose is None:
+                    self.fail(f"nothing can be sent: {error.strerror or error}")
+                with suppress(OSError):  # the thread finds it closed, and connects anew
+                    self._socket.shutdown(socket.SHUT_RDWR)
 
     # -- the thread ----------------------------------------------------------------------------------------------------------------
 
     def _run(self) -> None:
         try:
-            connection = self._connected()
-            self._heads = (
-                wire.encode_head(wire.NOTIFY, False, self.name, self.community),
-                wire.encode_head(wire.NOTIFY, True, self.name, self.community),
-            )
-            register = wire.encode_head(wire.REGISTER, False, self.name, self.community)
-            self.send([wire.joined(register, wire.encode_tail(k, 0.0, 0.0)) for k in self._variables])
-            self._read(connection)
+            while True:
+                try:
+                    self._serve()
+                except (ConnectionLostError, ConnectionResetError, BrokenPipeError, TimeoutError) as error:
+                    if self._lose is None or self._is_closing.is_set():
+                        raise
+                    with self.changed:
+                        self.trouble, self.n_lost = error.strerror or str(error) or CLOSED, self.n_lost + 1
+                        self._lose()
+                        self.changed.notify_all()
+                    if self._socket:
+                        self._socket.close()
         except ValueError as error:
             self.fail(f"this is not the protocol of MOOS: {error}")
         except OSError as error:
@@ -126,6 +142,17 @@ class MoosClient:
         finally:
             if self._socket:
                 self._socket.close()  # not before the reason is kept: `send` would find a closed socket, and call that the reason
+
+    def _serve(self) -> None:
+        """Connect, and read mail until the connection ends."""
+        connection = self._connected()
+        self._heads = (
+            wire.encode_head(wire.NOTIFY, False, self.name, self.community),
+            wire.encode_head(wire.NOTIFY, True, self.name, self.community),
+        )
+        register = wire.encode_head(wire.REGISTER, False, self.name, self.community)
+        self.send([wire.joined(register, wire.encode_tail(k, 0.0, 0.0)) for k in self._variables])
+        self._read(connection)
 
     def _connected(self) -> socket.socket:
         """Connect, trying again until there is a connection; returns the socket."""
@@ -137,15 +164,14 @@ class MoosClient:
                 self.trouble = error.strerror or str(error)
             else:
                 try:
-                    self.trouble = self._refusal(self._socket)
+                    trouble = self._refusal(self._socket)
                 except (TimeoutError, ConnectionResetError, BrokenPipeError) as error:
-                    self.trouble = error.strerror or "no answer"
-                except BaseException:
-                    self._socket.close()
-                    raise
-                if not self.trouble:
+                    trouble = error.strerror or "no answer"
+                if not trouble:
                     self._socket.settimeout(self._timeout)
+                    self.trouble = ""
                     return self._socket
+                self.trouble = trouble
                 self._socket.close()
             self._is_closing.wait(RETRY)
         raise ConnectionError(CLOSED)
@@ -187,7 +213,7 @@ class MoosClient:
                 if is_there:
                     data = connection.recv(65536)
                     if not data:
-                        raise ConnectionError(CLOSED)
+                        raise ConnectionLostError(CLOSED)
                     self._received += data
                     self._deliver(now - filled)
                     filled = now

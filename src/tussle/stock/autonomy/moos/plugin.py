@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from tussle.api import Autonomy, GroupView, Handle, HistoricAttributes, Output, Param
+from tussle.api import Autonomy, GroupView, Handle, HistoricAttributes, Output, Param, State
 from tussle.errors import MissingFileError, ParameterError
 from tussle.stock.autonomy.moos import wire
 from tussle.stock.autonomy.moos.mission_file import community_of
@@ -42,7 +42,8 @@ class MOOSAutonomy(Autonomy):
     TUSSLE_STEP_DONE. MOOSDB and helm are started by you: see the page "A helm of MOOS-IvP".
 
     Differences from the existing system: NODE_REPORT_LOCAL is sent; the time warp is that of MOOS's mission file; commands are used
-    from their first message on (there, 0 m/s and North until then); a MOOSDB or helm that fails ends the world.
+    from their first message on (there, 0 m/s and North until then); a MOOSDB or helm that fails ends the world, unless `on_loss` says
+    that it waits for a MOOSDB that comes back, or goes on until then.
 
     Raises:
         ParameterError: The mission file of MOOS cannot be read, or two vehicles have one community.
@@ -76,6 +77,13 @@ class MOOSAutonomy(Autonomy):
         0.0, structural=True, unit="s", ge=0.0, doc="Time between reports of contacts; 0 for each step."
     )
     timeout = Param(10.0, structural=True, unit="s", gt=0.0, doc="Longest wait for MOOSDB and helm.")
+    on_loss = Param(
+        "end",
+        choices=("end", "wait", "go_on"),
+        structural=True,
+        doc="When the MOOSDB ends: the world ends, waits until it is back (at most timeout), or goes on with the last commands until then.",
+    )
+    losses = State(dtype=int, doc="How often the connection was lost.")
     vessel = Handle(doc="The connection with the community.")
     desired_heading = Output(unit="rad", doc="From DESIRED_HEADING, counter-clockwise from East.")
     desired_speed = Output(unit="m/s", doc="DESIRED_SPEED.")
@@ -125,7 +133,7 @@ class MOOSAutonomy(Autonomy):
         owners[place] = f"entity {row.id} of world {row.world}"
         name = f"{values['moos_app_name']}_{row.id}"
         return Vessel(
-            replace(found, port=port), name, values["timeout"], values["lockstep"],
+            replace(found, port=port), name, values["timeout"], values["lockstep"], values["on_loss"],
             release=lambda: owners.pop(place, None),
         )  # fmt: skip
 
@@ -155,6 +163,7 @@ class MOOSAutonomy(Autonomy):
         for row, vessel in enumerate(vessels):
             if vessel.failure:
                 g.fail(row, vessel.failure)
+            self.losses[row] = vessel.client.n_lost
             self._obey(row, vessel.commands())
 
     def _obey(self, row: int, commands: dict[str, float]) -> None:
@@ -204,9 +213,9 @@ def _contacts(g: GroupView, world: int, time_: float) -> dict[int, bytes]:
 
 
 def _report(id_: int, team: int, state: list[float], time_: float) -> str:
-    """A node report of MOOS-IvP; state: the values of NAVIGATION."""
+    """A node report of MOOS-IvP; state: the values of NAVIGATION. GROUP is no number, since MOOS-IvP does not read numbers as groups."""
     x, y, heading, speed, depth = state
     return (
-        f"NAME={id_},X={x:.3f},Y={y:.3f},SPD={speed:.3f},HDG={heading:.3f},DEP={depth:.3f},TYPE=KAYAK,GROUP={team},"
+        f"NAME={id_},X={x:.3f},Y={y:.3f},SPD={speed:.3f},HDG={heading:.3f},DEP={depth:.3f},TYPE=KAYAK,GROUP=team_{team},"
         f"MODE=none,TIME={time_:.3f}"
     )

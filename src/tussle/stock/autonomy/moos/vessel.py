@@ -31,6 +31,7 @@ class Vessel:
         name: Name of the client.
         timeout: Longest wait for MOOSDB and helm [s].
         lockstep: Whether the helm answers each step.
+        on_loss: What happens when the MOOSDB ends: "end", or, until it comes back, "wait" or "go_on" with the last commands.
         release: Called after the connection has been closed.
 
     Attributes:
@@ -44,11 +45,14 @@ class Vessel:
         name: str,
         timeout: float,
         lockstep: bool,
+        on_loss: str,
         release: Callable[[], object],
     ) -> None:
         self.timeout, self.lockstep, self.time_warp = timeout, lockstep, community.time_warp
         self.reported, self._release = -math.inf, release
-        self._due = 0.0
+        self._due, self._goes_on = 0.0, on_loss == "go_on"
+        self._sent: list[bytes] = []
+        self._has_begun, self._n_lost = False, 0
         self._state = ""
         self._heard = time.monotonic()
         self._step = -1.0
@@ -57,8 +61,9 @@ class Vessel:
         self._source, self._former = "", set[str]()
         variables = (*DESIRED, STATE, DONE)
         self.client = MoosClient(
-            community.host, community.port, name, community.name, variables, timeout, self._receive
-        )
+            community.host, community.port, name, community.name, variables, timeout, self._receive,
+            None if on_loss == "end" else self._lose,
+        )  # fmt: skip
         self.client.start()  # whose thread calls `_receive`
 
     @property
@@ -72,8 +77,10 @@ class Vessel:
         self._release()
 
     def await_helm(self, limit: float) -> None:
-        """Wait for the MOOSDB and a helm, until a time of `time.monotonic`."""
-        self._await(lambda: bool(self._state), limit, "no helm has been heard")
+        """Wait for the MOOSDB and a helm, until a time of `time.monotonic`; while it goes on without them, only in the first step."""
+        if not (self._goes_on and self._has_begun):
+            self._await(lambda: bool(self._state), limit, "no helm has been heard")
+            self._has_begun = True
 
     def await_clock(self, dt: float) -> None:
         """Wait until the clock has moved by dt of the world since the last call."""
@@ -81,13 +88,25 @@ class Vessel:
         self._due = max(self._due + dt / self.time_warp, now - CATCH_UP) if self._due else now
         with self.client.changed:
             self.client.changed.wait_for(lambda: bool(self.failure), max(self._due - now, 0.0))
-        if time.monotonic() - self._heard > self.timeout:
+        if self._state and time.monotonic() - self._heard > self.timeout:
             self.client.fail(f"the helm has been silent for {self.timeout:g} s{self._state_text()}")
 
     def await_answer(self, limit: float) -> None:
         """Wait until the helm has answered the last step, until a time of `time.monotonic`."""
         text = f"the helm has not answered the step {self._step:g} ({STEP}) with {DONE}"
-        self._await(lambda: self._answer is not None, limit, text)
+        self._await(self._has_answer_or_loss, limit, text)
+        while self._answer is None and not self.failure:
+            if self._goes_on:
+                self._answer = dict(self._wanted)
+                return
+            limit = time.monotonic() + self.timeout
+            self._await(lambda: bool(self._state), limit, "no helm has been heard")
+            self._n_lost = self.client.n_lost
+            self.client.send(self._sent)
+            self._await(self._has_answer_or_loss, limit, text)
+
+    def _has_answer_or_loss(self) -> bool:
+        return self._answer is not None or self.client.n_lost > self._n_lost
 
     def publish(self, numbers: list[bytes], reports: list[bytes], step: int, now: float) -> None:
         """Send numbers and texts, each as `wire.encode_tail` returns it; in lockstep also the step, which the helm is to answer."""
@@ -95,7 +114,9 @@ class Vessel:
         if self.lockstep:
             with self.client.changed:
                 self._step, self._answer = float(step), None
+                self._n_lost = self.client.n_lost - bool(self.client.trouble)
             messages.append(self.client.number(wire.encode_tail(STEP, float(step), now)))
+        self._sent = messages
         self.client.send(messages)
 
     @property
@@ -119,7 +140,12 @@ class Vessel:
     def _state_text(self) -> str:
         return f"; its state is {texts.shown(self._state)}" if self._state else ""
 
-    # -- mail, in the client's thread ------------------------------------------------------------------------------------------------
+    # -- in the client's thread ------------------------------------------------------------------------------------------------------
+
+    def _lose(self) -> None:
+        """The MOOSDB has gone, and with it what the helm was told; a helm that comes back begins anew."""
+        self._state, self._source = "", ""
+        self._former.clear()
 
     def _receive(self, message: wire.MoosMessage) -> None:
         """Take a message of the helm.

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 import socket
+import time
+import warnings
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -20,6 +22,8 @@ FREEWHEEL_STEP = 4000
 """PX4's time between two messages while it starts [us]: its usual 250 Hz."""
 LOCKSTEP_FLAG = 1
 """HIL_ACTUATOR_CONTROLS_FLAGS_LOCKSTEP."""
+COMPONENT = 1
+"""MAV_COMP_ID_AUTOPILOT1."""
 
 
 class Px4Link(AutopilotLink):
@@ -28,11 +32,17 @@ class Px4Link(AutopilotLink):
     PX4's time begins with its first message. Until PX4 sends its first controls, the vehicle stands still, and PX4 gets the same
     measurements with the times of a clock of `FREEWHEEL_STEP`, so that it can start.
 
+    PX4 need not answer all measurements, since the rate of its controllers is limited. In lockstep, the step of one that has no answer
+    after `patience` goes on with the controls before. From then on only every n-th step waits, where n is the number of measurements from
+    one that was answered to the next.
+
     Args:
         listen: Address to listen at.
         port: Port to listen at.
         lockstep: Whether PX4 answers each message of its sensors.
-        timeout: Longest wait for an answer [s].
+        timeout: Longest silence [s].
+        patience: Longest wait for the answer to one message [s].
+        system: Number of the system from which messages come.
         freewheel_period: Time between the messages while PX4 starts [s].
         make_suite: Makes the sensors, from an encoder of messages.
         dialect: The module `pymavlink.dialects.v20.common`.
@@ -45,24 +55,28 @@ class Px4Link(AutopilotLink):
         port: int,
         lockstep: bool,
         timeout: float,
+        patience: float,
+        system: int,
         freewheel_period: float,
         make_suite: Callable[[Any], SensorSuite],
         dialect: Any,
         release: Callable[[], object],
     ) -> None:
         super().__init__(f"PX4 at port {port}", lockstep, timeout, release)
-        self._port, self._freewheel_period = port, freewheel_period
+        self._port, self._freewheel_period, self._patience = port, freewheel_period, patience
         self._socket = bound(socket.SOCK_STREAM, listen, port, "port")
         self._socket.listen(1)
-        self._is_connected = self._has_controls = False
+        self._is_connected = self._has_controls = self._has_told = False
         self._unsent, self._n_read = bytearray(), 0
-        self._mav = dialect.MAVLink(self, dialect.MAV_TYPE_GENERIC, dialect.MAV_COMP_ID_AUTOPILOT1)
+        self._mav = dialect.MAVLink(self, system, COMPONENT)
         self._mav.robust_parsing = True
         self._suite = make_suite(self._mav)
         self._state: VehicleState | None = None
         self._draws: Sequence[float] = ()
         self._now = self._offset = self._n_freewheel = 0
-        self._freewheel_due = 0.0
+        self._freewheel_due = self._sent_at = self._waited = 0.0
+        self._open: list[int] = []  # times of the measurements after the last one that was answered [us]
+        self._every = 1  # measurements for one answer
 
     def write(self, data: bytes) -> None:
         """Send bytes; called by the encoder."""
@@ -79,7 +93,6 @@ class Px4Link(AutopilotLink):
         self.receive()
         if had_controls:
             self._send_step()
-            self.is_done = not self.lockstep
 
     def receive(self) -> None:
         """Take the connection, and read all messages."""
@@ -112,7 +125,25 @@ class Px4Link(AutopilotLink):
             # PX4 takes a sensor for broken that measures the same again and again.
             sign = 1.0 if self._n_freewheel % 2 else -1.0
             self._send_sensors([sign * draw for draw in self._draws])
+        elif self._has_controls and not self.is_done and now - self._sent_at >= self._patience:
+            self._go_on()
         self._flush()
+
+    def _go_on(self) -> None:
+        """End the step with the controls before."""
+        assert self._state is not None
+        self._waited += self._patience
+        if self._waited >= self.timeout:
+            self.fail(f"{self.missing()} within {self.timeout:g} s")
+            return
+        if not self._has_told:
+            self._has_told = True
+            text = (
+                f"{self.autopilot}: no HIL_ACTUATOR_CONTROLS within {self._patience:g} s for the measurements of t = {self._state.t:g} s; "
+                "steps without an answer go on with the controls before, and `unanswered` counts them"
+            )
+            warnings.warn(text, RuntimeWarning, stacklevel=2)
+        self.is_unanswered = self.is_done = True
 
     def missing(self) -> str:
         """What has not come."""
@@ -141,18 +172,23 @@ class Px4Link(AutopilotLink):
         if kind == "BAD_DATA":
             self.fail(f"this is not MAVLink: {texts.shown(bytes(message.data).decode('latin-1'))}")
         elif kind == "HIL_ACTUATOR_CONTROLS":
-            # PX4 stamps its answer with the time of the measurements; an older one answers others. While PX4 starts, any will do: it
-            # may be slower than the measurements come.
+            # PX4 stamps its answer with the time of the measurements. While PX4 starts, any will do: it may be slower than they come.
             is_stamped = bool(message.flags & LOCKSTEP_FLAG) and self.lockstep and self._has_controls
-            if is_stamped and message.time_usec < self._now:
+            answered = (
+                sum(sent <= message.time_usec for sent in self._open) if is_stamped else len(self._open)
+            )
+            if is_stamped and not answered:  # it is older than the controls that there are
                 return
             if any(map(math.isinf, message.controls)):
                 self.fail("HIL_ACTUATOR_CONTROLS has infinite numbers")
                 return
             self.hear()
+            self._waited = 0.0
             self.commands = {k: x for k, x in enumerate(message.controls) if not math.isnan(x)}
             if self._has_controls:
-                self.is_done = True
+                del self._open[:answered]
+                self._every = max(answered, 1)
+                self.is_done = self.is_done or not self._open
             else:
                 self._start()
 
@@ -162,14 +198,17 @@ class Px4Link(AutopilotLink):
         self._has_controls = True
         self._offset = self._now + FREEWHEEL_STEP - round(1e6 * self._state.t)
         self._send_step()
-        self.is_done = not self.lockstep
 
     def _send_step(self) -> None:
-        """Send the measurements of this step."""
+        """Send the measurements of this step, and wait for an answer if one is due."""
         assert self._state is not None
-        self._now = self._offset + round(1e6 * self._state.t)
+        self._now, self._sent_at = self._offset + round(1e6 * self._state.t), time.monotonic()
         self._send_sensors(self._draws)
         self._flush()
+        self._open.append(self._now)
+        is_due = len(self._open) >= self._every
+        self.is_done = not (self.lockstep and is_due)
+        self.is_unanswered = self.lockstep and not is_due
 
     def _send_sensors(self, draws: Sequence[float]) -> None:
         assert self._state is not None

@@ -25,7 +25,9 @@ class PX4(Autopilot):
     In each step it sends HIL_SENSOR, HIL_STATE_QUATERNION and, at gps_rate, HIL_GPS of MAVLink, and takes HIL_ACTUATOR_CONTROLS; a row
     of `control_map` is [channel output control_min control_max channel_min channel_max factor], outputs counted from 0. An output that is
     not a number gives 0. The vehicle with the id 1 listens at `port`, that of PX4's instance 0; each id more adds port_step. A step is
-    the mission's, usually 0.004 s. Until PX4 sends its first controls the vehicle stands still. See [Autopilots](../autopilots.md).
+    the mission's, usually 0.004 s. A step whose measurements are not answered goes on with the controls before, since the rate of PX4's
+    controllers is limited; `unanswered` counts such steps, and a PX4 that is silent for `timeout` ends the world. Until PX4 sends its
+    first controls the vehicle stands still. See [Autopilots](../autopilots.md).
 
     It needs `pip install 'tussle[autopilot]'`.
 
@@ -47,6 +49,16 @@ class PX4(Autopilot):
     )
     port_step = Param(1, structural=True, ge=0, le=MOST_PORT, doc="Ports are higher by this for each id.")
     listen_ip = Param("127.0.0.1", doc="Address of this machine at which PX4 connects.")
+    system_id = Param(
+        1, structural=True, ge=1, le=255, doc="Number of the MAVLink system from which measurements come."
+    )
+    patience = Param(
+        1.0,
+        structural=True,
+        unit="s",
+        gt=0.0,
+        doc="Longest wait for an answer in lockstep, wall time, before the step goes on with the controls before.",
+    )
     gps_rate = Param(10.0, structural=True, unit="1/s", gt=0.0, le=1000.0, doc="Rate of HIL_GPS.")
     slow_rate = Param(
         50.0, structural=True, unit="1/s", gt=0.0, le=1000.0, doc="Rate of magnetic field and pressures."
@@ -107,6 +119,8 @@ class PX4(Autopilot):
                 port,
                 own["lockstep"],
                 own["timeout"],
+                own["patience"],
+                own["system_id"],
                 own["freewheel_period"],
                 make_suite,
                 common,

@@ -66,16 +66,15 @@ class SensorSuite:
 
     def send(self, now: int, state: VehicleState, draws: Sequence[float]) -> None:
         """Send what is due at a time [us]; draws: ten standard normal numbers."""
+        is_slow = now >= self._slow_due
+        if is_slow:
+            self._slow_due = now + self._slow_period
+        updated = INERTIAL | SLOW if is_slow else INERTIAL
+        self._send_sensors(now, state, draws, updated)  # first: PX4 sets its clock by it
         self._send_state(now, state)
         if now >= self._gps_due:
             self._gps_due = now + self._gps_period
             self._send_gps(now, state)
-        is_slow = now >= self._slow_due
-        if is_slow:
-            self._slow_due = now + self._slow_period
-        self._send_sensors(
-            now, state, draws, INERTIAL | SLOW if is_slow else INERTIAL
-        )  # last: it is answered
 
     def _send_sensors(self, now: int, state: VehicleState, draws: Sequence[float], updated: int) -> None:
         """HIL_SENSOR."""

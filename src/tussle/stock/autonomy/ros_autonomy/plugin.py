@@ -7,10 +7,16 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from tussle.api import Autonomy, GroupView, Handle, Input, Output, Param
-from tussle.numeric.quaternion import quat_from_euler, quat_rotate, quat_rotate_inverse
+from tussle.api import Autonomy, GroupView, Handle, Input, Output, Param, State
+from tussle.numeric.quaternion import (
+    quat_conjugate,
+    quat_from_euler,
+    quat_multiply,
+    quat_rotate,
+    quat_rotate_inverse,
+)
 from tussle.ros.link import RosLink
-from tussle.ros.robot import RobotTopics
+from tussle.ros.robot import AT_ORIGIN, RobotTopics, height_above_floor, on_floor
 from tussle.ros.steps import NodeLink
 
 
@@ -29,6 +35,9 @@ class CommandedByROS(Autonomy):
         unit="s",
         ge=0.0,
         doc="Simulated time after which a robot stops without a new command; 0 for never.",
+    )
+    stamped_commands = Param(
+        False, structural=True, doc="Whether cmd_vel is a TwistStamped; otherwise it is a Twist."
     )
     speed = Output(unit="m/s", doc="linear.x of the last command.")
     turn_rate = Output(unit="rad/s", doc="angular.z.")
@@ -54,7 +63,11 @@ class CommandedByROS(Autonomy):
             RosError: The master does not answer, or the domain cannot be joined.
             ParameterError: The namespace is no name of ROS.
         """
-        return RobotTopics(self.link_type.of(row.shared), self.namespace(row), self.publishes)
+        link, is_stamped = self.link_type.of(row.shared), row.plugin.values["stamped_commands"]
+        robot = RobotTopics(link, self.namespace(row), self.publishes, is_stamped)
+        if self.publishes:
+            link.namespaces[row.id] = robot.namespace
+        return robot
 
     def close_one(self, robot: RobotTopics) -> None:
         """Take no more commands."""
@@ -67,8 +80,12 @@ class CommandedByROS(Autonomy):
         """Publish the states of all robots, and return their transforms; only robots that publish do."""
         return []
 
+    def begin_odometry(self, g: GroupView, rows: np.ndarray) -> None:
+        """Begin the odometry of newborn rows; only robots that publish have any."""
+
     def spawn(self, g: GroupView, rows: np.ndarray) -> None:
         """Let the link publish the states of this group."""
+        self.begin_odometry(g, rows)
         robots: Any = self.robot
         for robot in [robots[row] for row in rows]:
             robot.link.groups[id(self)] = self, g
@@ -106,6 +123,11 @@ class PublishedByROS(CommandedByROS):
         0.0, unit="s", ge=0.0, structural=True,
         doc="Longest wait in each step, in wall time, for a command to each robot; 0: take those that are there.",
     )  # fmt: skip
+    odometry_time = State(unit="s", doc="Time of the last odometry.")
+    drift = State("x y z", unit="m", doc="Error of the position of odometry: the sum of those of velocities.")
+    drift_variance = State("x y z", unit="m^2", doc="Variance of the drift.")
+    measured_vel = State("x y z", unit="m/s", doc="Velocity of the last odometry, world frame.")
+    measured_for = State(unit="s", doc="Time for which the measured velocity has been the same.")
     points = Input(
         "raytrace", fields="x y z range in_range", unit="m m m m 1", ragged=True, optional=True, doc="Scan."
     )
@@ -114,26 +136,76 @@ class PublishedByROS(CommandedByROS):
         """Return the namespace of the robot of a handle's row."""
         return f"{row.plugin.values['namespace_prefix']}{row.id}"
 
+    def begin_odometry(self, g: GroupView, rows: np.ndarray) -> None:
+        """Begin the odometry of newborn rows, without an error."""
+        self.odometry_time[rows], self.measured_vel[:, rows] = g.t[rows], g.vel[:, rows]
+
     def publish_state(self, g: GroupView) -> list[Any]:
         """Publish the states of all robots, and return their transforms."""
         robots: Any = self.robot
         link: NodeLink = robots[0].link
-        truth, rows = g.bodies, slice(g.first, g.last)
-        true = [np.asarray(getattr(truth, name)[:, rows]) for name in ("pos", "quat", "vel", "omega")]
-        believed, actual = _body_states(g.pos, g.quat, g.vel, true[3]), _body_states(*true)
+        bodies, rows = g.bodies, slice(g.first, g.last)
+        pos, quat, vel, omega = (
+            np.asarray(getattr(bodies, name)[:, rows]) for name in ("pos", "quat", "vel", "omega")
+        )
+        covariances = self._dead_reckon(g, quat, vel)
+        actual = _body_states(pos, quat, vel, omega)
+        odometry = _body_states(pos + self.drift, quat, g.vel, omega)
+        height = height_above_floor(g.scene, pos)
+        poses = [self._anchors(g, pos + self.drift, quat), *on_floor(pos + self.drift, quat, height)]
         stamp = link.stamp(float(g.t[0]))
         pattern = g.call("scan_pattern") if "scan_pattern" in g.services else None
         transforms: list[Any] = []
         for row, robot in enumerate(robots):
             robot.n_before = robot.inbox.n_received  # before publishing: the answer may be quick
-            robot.publish_odometry(stamp, believed[row], actual[row])
-            laser = None
+            robot.publish_odometry(
+                stamp, odometry[row], None if covariances is None else covariances[row], actual[row]
+            )
+            own = [pose[row] for pose in poses]
             if pattern is not None:
                 about = pattern(row)
-                laser = about.pos, about.quat
+                own.append([*about.pos.tolist(), *about.quat.tolist()])
                 self._publish_scan(g, row, robot, about)
-            transforms += robot.transforms(believed[row], stamp, laser)
+            transforms += robot.transforms(own, stamp)
         return transforms
+
+    def _dead_reckon(self, g: GroupView, quat: np.ndarray, vel: np.ndarray) -> np.ndarray | None:
+        """Let the odometry drift, as one that adds up measured velocities; returns its covariances, (n, 2, 36), if it has any.
+
+        Args:
+            g: The robots.
+            quat: True attitudes, (4, n).
+            vel: True velocities, world frame [m/s], (3, n).
+        """
+        if not g.belief:
+            return None
+        dt = g.t - self.odometry_time
+        self.odometry_time[:] = g.t
+        is_held = (g.vel == self.measured_vel).all(axis=0)
+        self.measured_vel[:] = g.vel
+        self.measured_for[:] = np.where(is_held, self.measured_for, 0.0) + dt
+        self.drift[:] += (g.vel - vel) * dt
+        if "velocity_noise" not in g.services:
+            return None
+        variance = g.call("velocity_noise") ** 2
+        # In the time T for which an error is held, it grows to T times the error: its variance to T^2 times that of the velocity.
+        self.drift_variance[:] += variance * dt * (2.0 * self.measured_for - dt)
+        covariances = np.zeros((g.n, 2, 6, 6))
+        axes = np.stack([
+            quat_rotate_inverse(quat, np.repeat(axis[:, None], g.n, axis=1)) for axis in np.eye(3)
+        ])  # fmt: skip
+        covariances[:, 1, :3, :3] = np.einsum("kin,kn,kjn->nij", axes, variance, axes)
+        for axis in range(3):
+            covariances[:, 0, axis, axis] = self.drift_variance[axis]
+        return covariances.reshape(g.n, 2, 36)
+
+    def _anchors(self, g: GroupView, pos: np.ndarray, quat: np.ndarray) -> list[list[float]]:
+        """Poses of odom in the root, where the robots, at `pos` [m] and `quat` in odom, believe themselves to be."""
+        if not g.belief:
+            return [AT_ORIGIN] * g.n
+        turn = quat_multiply(g.quat, quat_conjugate(quat))
+        anchors: list[list[float]] = np.concatenate([g.pos - quat_rotate(turn, pos), turn]).T.tolist()
+        return anchors
 
     def _publish_scan(self, g: GroupView, row: int, robot: RobotTopics, about: Any) -> None:
         """Publish the scan of a row if it is new."""
@@ -178,11 +250,13 @@ class PublishedByROS(CommandedByROS):
 class ROSAutonomy(PublishedByROS):
     """Connects a robot to ROS 1 as Stage does: cmd_vel moves it; odom, base_pose_ground_truth, base_scan and tf are published.
 
-    Its topics are in the namespace `namespace_prefix` followed by its id, such as entity1/cmd_vel, and so are its frames: odom,
-    base_footprint, base_link, base_laser_link. At the beginning of each step it publishes the states at that time and takes the newest
-    command; a robot without any stands still. odom is its belief, base_pose_ground_truth its true state, both relative to the
-    world frame's origin. base_scan is the scan of a `RayTrace` with one elevation. Stamps are simulated time with
-    `ROSClockServer` or the ROS parameter use_sim_time, and the wall clock's otherwise. [ROS](../ros.md) tells more.
+    Its topics are in the namespace `namespace_prefix` followed by its id, such as entity1/cmd_vel, and so are its frames, as REP 105 and
+    120 have them: odom, base_footprint, base_link, base_laser_link, below `world`, the mission's frame. At the beginning of each step it
+    publishes the states at that time and takes the newest command; a robot without any stands still. base_pose_ground_truth is its true
+    state. odom is that too where no sensor measures the state. Otherwise it adds up the measured velocities: it drifts but does not
+    jump, and the transform from `world` to odom is such that the robot is where it believes to be. base_scan is the scan of a
+    `RayTrace` with one elevation. Stamps are simulated time with `ROSClockServer` or the ROS parameter use_sim_time, and the wall
+    clock's otherwise. [ROS](../ros.md) tells more.
 
     With `lockstep`, each step waits until each robot has received a command after its odom of that step.
 

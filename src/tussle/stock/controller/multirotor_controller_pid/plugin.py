@@ -9,6 +9,7 @@ import numpy as np
 
 from tussle.api import Controller, GroupView, Input, Output, Param, State
 from tussle.errors import ParameterError
+from tussle.numeric import total
 from tussle.stock.controller.multirotor_controller_pid import kernels
 
 GAINS = "kp ki kd band"
@@ -30,7 +31,7 @@ def mixer_of(rotors: Any) -> list[list[float]]:
     """
     rows = [[1.0, y, -x, direction] for direction, x, y, *_ in rotors]
     n = range(4)
-    system = [[sum(row[i] * row[j] for row in rows) for j in n] + [float(i == j) for j in n] for i in n]
+    system = [[total(row[i] * row[j] for row in rows) for j in n] + [float(i == j) for j in n] for i in n]
     for i in n:
         pivot = max(range(i, 4), key=lambda k: abs(system[k][i]))
         system[i], system[pivot] = system[pivot], system[i]
@@ -43,7 +44,7 @@ def mixer_of(rotors: Any) -> list[list[float]]:
         for k in n:
             if k != i:
                 system[k] = [a - system[k][i] * b for a, b in zip(system[k], system[i], strict=True)]
-    return [[sum(row[k] * system[k][4 + j] for k in n) for j in n] for row in rows]
+    return [[total(row[k] * system[k][4 + j] for k in n) for j in n] for row in rows]
 
 
 class MultirotorControllerPID(Controller):

@@ -9,7 +9,7 @@ import numpy as np
 
 from tussle.api import HistoricAttributes, Interaction, Param, State, WorldView, service
 from tussle.messages import BoundaryCrossed, BoundaryShape
-from tussle.numeric import cos, sin
+from tussle.numeric import cos, sin, total
 from tussle.scene import Cuboid, Plane, Polyhedron, Prism, Sphere, TeamRegion, Volume
 from tussle.shapes import Vector
 
@@ -142,4 +142,4 @@ def _volume(
 
 def _mean(points: tuple[tuple[float, ...], ...]) -> tuple[float, ...]:
     """Mean of points."""
-    return tuple(sum(values) / len(points) for values in zip(*points, strict=True))
+    return tuple(total(values) / len(points) for values in zip(*points, strict=True))

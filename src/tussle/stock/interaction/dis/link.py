@@ -63,7 +63,7 @@ class ExerciseLink:
 
     def __init__(self, address: str, port: int, listen_address: str, listen_port: int) -> None:
         self.remotes: dict[int, Remote] = {}
-        self.sent: dict[int, np.ndarray] = {}
+        self.sent: dict[int, tuple[np.ndarray, float]] = {}
         self.n_sent = self.n_received = self.n_refused = 0
         self.stamp, self._due, self._t = 0, 0.0, -math.inf
         self._listens = bool(listen_port)
@@ -158,16 +158,18 @@ class ExerciseLink:
             except OSError as reason:
                 place, port = self._place
                 raise ParameterError(f"DIS: address = {place!r}, port {port}: {reason.strerror}") from None
-            self.sent[int(record["entity"])] = record
+            self.sent[int(record["entity"])] = record, self._t
         self.n_sent += len(records)
 
     def leave(self, numbers: list[int]) -> None:
-        """Tell the others that entities with these numbers are gone."""
-        gone = [self.sent[number] for number in numbers]
-        for record in gone:
-            record["appearance"] |= pdu.DEACTIVATED
-            record["timestamp"] = self.stamp
-        self.send(np.array(gone, pdu.LAYOUT))
+        """Tell the others that entities with these numbers are gone, at the places where they take them to be now."""
+        if not numbers:
+            return
+        records, times = zip(*(self.sent[number] for number in numbers), strict=True)
+        gone = pdu.moved_on(np.array(list(records), pdu.LAYOUT), self._t - np.array(times))
+        gone["appearance"] |= pdu.DEACTIVATED
+        gone["timestamp"] = self.stamp
+        self.send(gone)
         for number in numbers:
             del self.sent[number]
 

@@ -70,7 +70,7 @@ def encode(
     out["pdu_type"], out["family"], out["length"] = ENTITY_STATE, ENTITY_INFORMATION, LAYOUT.itemsize
     out["location"] = origin.to_earth_centred(pos).T
     out["velocity"] = quat_rotate(origin.quat, vel).T
-    out["orientation"] = np.stack([quat_to_yaw(attitude), quat_to_pitch(attitude), quat_to_roll(attitude)]).T
+    out["orientation"] = _angles(attitude)
     out["algorithm"], out["character_set"] = CONSTANT_RATES, ASCII
     out["angular_velocity"] = to_forward_right_down(quat, omega).T
     return out
@@ -116,17 +116,36 @@ def reckon(records: np.ndarray, age: np.ndarray, origin: Origin) -> tuple[np.nda
     Returns:
         Position [m] (3, n), velocity [m/s] (3, n), attitude (4, n), angular velocity [rad/s] (3, n), in the world frame.
     """
-    psi, theta, phi = records["orientation"].astype(float).T
-    attitude = quat_from_euler(phi, theta, psi)
-    moved = extrapolate(
-        records["algorithm"], records["location"].astype(float).T, records["velocity"].astype(float).T,
-        records["acceleration"].astype(float).T, attitude, records["angular_velocity"].astype(float).T, age,
-    )  # fmt: skip
-    pos, vel, attitude, omega = moved
+    pos, vel, attitude, omega = _extrapolated(records, age)
     back = origin.quat * np.array([1.0, -1.0, -1.0, -1.0])
     quat = quat_multiply(quat_multiply(back, attitude), FORWARD_RIGHT_DOWN)
     omega = quat_rotate(quat_multiply(back, attitude), omega)
     return origin.from_earth_centred(pos), quat_rotate(back, vel), quat, omega
+
+
+def moved_on(records: np.ndarray, age: np.ndarray) -> np.ndarray:
+    """PDUs, (n,), of the same entities some time [s], (n,), later, by their dead reckoning algorithms."""
+    out = records.copy()
+    pos, vel, attitude, _ = _extrapolated(records, age)
+    out["location"], out["velocity"], out["orientation"] = pos.T, vel.T, _angles(attitude)
+    return out
+
+
+def _angles(attitude: np.ndarray) -> np.ndarray:
+    """Psi, theta, phi [rad], (n, 3), of attitudes in the earth-centred frame."""
+    return np.stack([quat_to_yaw(attitude), quat_to_pitch(attitude), quat_to_roll(attitude)]).T
+
+
+def _extrapolated(
+    records: np.ndarray, age: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """What `extrapolate` returns, in the earth-centred frame."""
+    psi, theta, phi = records["orientation"].astype(float).T
+    return extrapolate(
+        records["algorithm"], records["location"].astype(float).T, records["velocity"].astype(float).T,
+        records["acceleration"].astype(float).T, quat_from_euler(phi, theta, psi),
+        records["angular_velocity"].astype(float).T, age,
+    )  # fmt: skip
 
 
 def extrapolate(

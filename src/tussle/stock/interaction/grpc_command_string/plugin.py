@@ -26,8 +26,9 @@ class GRPCCommandString(Interaction):
 
     The service is that of the existing system, `SendCommandString` of `scrimmage_msgs.ScrimmageMsgService`, so that its clients work
     unchanged. A topic "/3/State" is the topic "State", for entity 3 only; `CommandStringRelay` passes texts on to the entity's other
-    plugins. Entities receive a text in the step after the one that publishes it. A command for a topic that no plugin listens to is
-    answered by an error that names those that are; there, it was lost. Whoever reaches the port may send commands.
+    plugins. Entities receive a text in the step after the one that publishes it. A command for a topic that no plugin listens to, or
+    for an entity that has never been, is answered by an error that names what there is; there, it was lost. Whoever reaches the port
+    may send commands.
 
     Raises:
         MissingExtraError: grpcio or protobuf are not installed.
@@ -41,11 +42,14 @@ class GRPCCommandString(Interaction):
 
     def start(self, w: WorldView) -> None:
         """Serve."""
-        self._server(w)
+        server = self._server(w)
+        server.last_id = int(w.id.max(initial=0))
 
     def step(self, w: WorldView) -> None:
         """Publish what has come."""
-        waiting, worlds = self._server(w).waiting, np.array(w.active_worlds(), np.int64)
+        server = self._server(w)
+        server.last_id = max(server.last_id, int(w.id.max(initial=0)))
+        waiting, worlds = server.waiting, np.array(w.active_worlds(), np.int64)
         for _ in range(len(waiting)):
             network, topic, text, to = waiting.popleft()
             fields = {"text": text, "to": to}
@@ -72,13 +76,14 @@ class CommandServer:
         heard: Network and name of each topic that plugins listen to.
 
     Attributes:
+        last_id: Largest id of an entity that has been born.
         waiting: Network, topic, text, and id of the entity that it is for or 0, of commands that are not yet published.
     """
 
     def __init__(self, address: str, heard: list[tuple[str, str]]) -> None:
         grpc = load_grpc("GRPCCommandString")
         self.waiting: deque[tuple[str, str, str, int]] = deque()
-        self._heard, self._status = heard, grpc.StatusCode
+        self._heard, self._status, self.last_id = heard, grpc.StatusCode, 0
         types = message_types("scrimmage_msgs", **COMMANDS)
         self._ack = types["CommandAck"]
         _, service, method = SEND_COMMAND.split("/")
@@ -103,6 +108,11 @@ class CommandServer:
         network, topic, to = command.network or "GlobalNetwork", command.topic, 0
         if found := ONE_ENTITY.fullmatch(topic):
             to, topic = int(found[1]), found[2]
+            if not 0 < to <= self.last_id:
+                call.abort(
+                    self._status.INVALID_ARGUMENT,
+                    f"topic {command.topic[:80]!r}: no entity has had the id {to}; ids are 1 to {self.last_id}",
+                )
         if (network, topic) not in self._heard:
             names = [" ".join(each) for each in self._heard]
             near = nearest_name(f"{network} {topic}", names)

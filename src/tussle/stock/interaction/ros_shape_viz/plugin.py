@@ -8,6 +8,7 @@ import numpy as np
 
 from tussle.api import Interaction, Param, WorldView
 from tussle.ros.link import RosLink
+from tussle.ros.robot import ROOT
 
 SPHERE, POINTS = 2, 8  # visualization_msgs/Marker
 ADD = 0
@@ -32,7 +33,7 @@ class ROSShapeViz(Interaction):
     grade = "external"
     awaits = "ROS"
 
-    frame = Param("map", doc="Frame of the published markers: the world frame.")
+    frame = Param(ROOT, doc="Frame of the published markers: the world frame.")
 
     def start(self, w: WorldView) -> None:
         """Connect the topics."""

@@ -44,7 +44,7 @@ class Fleet:
         return self.flights[number].save() if number in self.flights else ()
 
     def place(self, numbers: Sequence[int], places: np.ndarray, origin: Origin) -> Flown:
-        """Set the states of some aircraft; places are as in `JSBSimFlight.place`, (m, 15)."""
+        """Set the states of some aircraft; places are as in `JSBSimFlight.place`, (m, 17)."""
         return self._each(numbers, places, lambda flight, place: flight.place(place, origin))
 
     def fly(self, numbers: Sequence[int], commands: np.ndarray, n_steps: int) -> Flown:

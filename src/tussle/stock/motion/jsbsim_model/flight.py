@@ -15,7 +15,7 @@ from typing import Any, NamedTuple, Self
 
 from tussle import documents, units
 from tussle.errors import MissingFileError, ParameterError, nearest_name
-from tussle.geodesy import Origin
+from tussle.geodesy import SEMI_MAJOR, Origin
 
 FOOT = float(units.FOOT)  # [m]
 STATE = (
@@ -53,6 +53,8 @@ class Aircraft(NamedTuple):
         flightgear: Address, port and protocol of a FlightGear that shows the aircraft, if any.
         commanded: Properties that are set before each step; THROTTLES stands for the throttles of all engines.
         needed: Properties that the aircraft must have.
+        is_historic: Fly as in SCRIMMAGE: over a sphere, with engines that the script starts, and commands that are set in each step.
+        throttle_from: Time before which throttles stay closed [s].
     """
 
     root: str
@@ -62,6 +64,8 @@ class Aircraft(NamedTuple):
     flightgear: tuple[str, int, str] | None
     commanded: tuple[str, ...]
     needed: tuple[str, ...]
+    is_historic: bool = False
+    throttle_from: float = 0.0
 
 
 STANDING = 1.0
@@ -98,8 +102,10 @@ class JSBSimFlight:
         self.fdm = load(aircraft, dt)
         n_engines = self.fdm.get_propulsion().get_num_engines()
         throttles = tuple(f"{THROTTLES}[{i}]" for i in range(n_engines))
+        self.time = 0.0
         nodes = self.fdm.get_property_manager().get_node
         # Through its node, a property is read and written in a tenth of the time of `fdm[name]`.
+        self.throttles = [nodes(name, True).set_double_value for name in throttles]
         self.write = [
             (nodes(each, True).set_double_value, k)
             for k, name in enumerate(aircraft.commanded)
@@ -118,29 +124,31 @@ class JSBSimFlight:
         """Set the state.
 
         Args:
-            values: Values of the properties PLACE, MOTION and WIND. Without a velocity, an aircraft starts with that of its script.
+            values: Values of the properties PLACE, MOTION and WIND, of which NaN stands for that of the script; the time of the world [s];
+                the number of steps that follow at once.
             origin: Origin of the world frame; the ground has its altitude.
 
         Raises:
             ParameterError: The aircraft cannot be trimmed.
         """
         self.history.append(((values, origin), array("d")))
-        place, motion, wind = values[:6], values[6:12], values[12:]
+        state, wind, (self.time, n_steps) = values[:12], values[12:15], values[15:]
         fdm, start = self.fdm, self.aircraft
         fdm["ic/terrain-elevation-ft"] = origin.altitude / FOOT
-        for name, value in zip(PLACE, place, strict=True):
-            fdm[name] = value
-        if self.is_placed or any(motion[:3]):
-            for name, value in zip(MOTION, motion, strict=True):
+        for name, value in zip(PLACE + MOTION, state, strict=True):
+            if not math.isnan(value):
                 fdm[name] = value
         fdm.run_ic()
         for name, value in zip(WIND, wind, strict=True):
             fdm[name] = value
         if not self.is_placed:
             self.is_placed = True
-            fdm["propulsion/set-running"] = -1
+            if not start.is_historic:
+                fdm["propulsion/set-running"] = -1
             if start.trim != "none":
                 self._trim()
+        for _ in range(int(n_steps)):
+            self._step()
 
     def _trim(self) -> None:
         import jsbsim
@@ -156,10 +164,18 @@ class JSBSimFlight:
     def fly(self, values: Sequence[float], n_steps: int) -> None:
         """Set the commands and make some steps."""
         self.history[-1][1].extend((*values, n_steps))
+        for step in range(n_steps):
+            if step == 0 or self.aircraft.is_historic:
+                self._command(values)
+            self._step()
+            self.time += self.dt
+
+    def _command(self, values: Sequence[float]) -> None:
         for write, k in self.write:
             write(values[k])
-        for _ in range(n_steps):
-            self._step()
+        if self.time < self.aircraft.throttle_from:
+            for write in self.throttles:
+                write(0.0)
 
     def _step(self) -> None:
         """Make one step.
@@ -264,6 +280,8 @@ def load(aircraft: Aircraft, dt: float) -> Any:
     log.lines.clear()
     fdm = jsbsim.FGFDMExec(str(root))
     fdm.set_debug_level(0)
+    if aircraft.is_historic:
+        _make_spherical(fdm)
     fdm.set_dt(dt)
     try:
         is_loaded = fdm.load_script(f"scripts/{name}", dt, "") if aircraft.script else fdm.load_model(name)
@@ -289,6 +307,18 @@ def load(aircraft: Aircraft, dt: float) -> Any:
     if aircraft.flightgear:
         _show(fdm, aircraft.flightgear, dt)
     return fdm
+
+
+def _make_spherical(fdm: Any) -> None:
+    """Replace the ellipsoid by a sphere of its equatorial radius, as JSBSim 1.1 had where SCRIMMAGE calls it."""
+    axes = "".join(f'<{name}_axis unit="M">{SEMI_MAJOR}</{name}_axis>' for name in ("semimajor", "semiminor"))
+    with tempfile.NamedTemporaryFile("w", suffix=".xml") as file:
+        file.write(f'<planet name="sphere">{axes}</planet>')
+        file.flush()
+        if not fdm.load_planet(file.name, False):
+            raise ParameterError(
+                "JSBSim does not take a spherical planet; SCRIMMAGE's laws need JSBSim 1.2 or newer"
+            )
 
 
 def _show(fdm: Any, flightgear: tuple[str, int, str], dt: float) -> None:

@@ -83,6 +83,8 @@ class JSBSimAircraft(RigidBodyModel):
     historic_attributes = HistoricAttributes(unread=("use_pitch",))
     needed_properties: ClassVar[tuple[str, ...]] = ()
     commanded: ClassVar[tuple[str, ...]] = ()
+    is_historic: ClassVar[bool] = False
+    throttle_from: ClassVar[float] = 0.0
 
     script_name = Param(
         doc="File below `scripts` that names an aircraft, its start and its events.", default=""
@@ -145,6 +147,7 @@ class JSBSimAircraft(RigidBodyModel):
         loaded = Aircraft(
             own["jsbsim_root"], own["aircraft"], own["script_name"], own["trim"],
             flightgear if own["flightgear_output_enable"] else None, self.commanded, self.needed_properties,
+            self.is_historic, self.throttle_from,
         )  # fmt: skip
         flight = FlightHandle(self._fleet(row), row.scene.origin)
         flight.fleet.open(flight.number, loaded, row.dt)
@@ -183,23 +186,34 @@ class JSBSimAircraft(RigidBodyModel):
         super().from_body(body, rows)
         rows = np.array([row for row in rows if self.flight[row] is not None], np.int64)
         if len(rows):
-            self.spawn(body, rows)
+            self.place(body, rows, self.start_values(body, rows))
 
     def spawn(self, body: Any, rows: np.ndarray) -> None:
         """Place the aircraft of some rows. Without a velocity at its birth, an aircraft has that of its script."""
+        values = self.start_values(body, rows)
+        values[6:, ~body.vel[:, rows].any(axis=0)] = np.nan
+        self.place(body, rows, values)
+
+    def start_values(self, body: Any, rows: np.ndarray) -> np.ndarray:
+        """Return the states of some rows as the properties PLACE and MOTION, (12, m)."""
         origin = self.flight[rows[0]].origin
         latitude, longitude, altitude = origin.to_geodetic(body.pos[:, rows])
-        frames = np.empty((4, len(rows)))
-        kernels.local_frames(latitude, longitude, (origin.latitude, origin.longitude), frames)
+        frames = local_frames(origin, latitude, longitude)
         attitude = quat_multiply(
             quat_conjugate(frames), quat_multiply(body.quat[:, rows], FORWARD_RIGHT_DOWN)
         )
         angles = quat_to_roll(attitude), quat_to_pitch(attitude), quat_to_yaw(attitude)
         velocity = quat_rotate_inverse(frames, body.vel[:, rows]) / FOOT
-        wind = quat_rotate_inverse(frames, self.wind[:, rows]) / FOOT
         place = np.stack([latitude, longitude, above_sea_level(latitude, altitude) / FOOT, *angles])
-        motion = np.concatenate([velocity, MIRRORED * self.rigid_body[10:, rows], wind])
-        values = np.concatenate([place, motion]).T
+        return np.concatenate([place, velocity, MIRRORED * self.rigid_body[10:, rows]])
+
+    def place(self, body: Any, rows: np.ndarray, start: np.ndarray, n_steps: int | np.ndarray = 0) -> None:
+        """Place the aircraft of some rows, (12, m) as in `start_values` or NaN for the script's, and let them make n_steps steps."""
+        origin = self.flight[rows[0]].origin
+        latitude, longitude, _ = origin.to_geodetic(body.pos[:, rows])
+        wind = quat_rotate_inverse(local_frames(origin, latitude, longitude), self.wind[:, rows]) / FOOT
+        steps = np.broadcast_to(n_steps, len(rows))
+        values = np.concatenate([start, wind, [body.t[rows], steps]]).T
         self._apply(rows, lambda fleet, numbers: fleet.place(numbers, values, origin))
         self._report(body)
 
@@ -233,10 +247,14 @@ class JSBSimAircraft(RigidBodyModel):
                 flight.failure = failed.get(flight.number, "")
             is_sound = np.array([not flight.failure for flight in flights])
             read, rows = read[is_sound], rows[is_sound]
-        moving, state, origin = np.empty((10, len(rows))), self.rigid_body, flights[0].origin
+        self.rigid_body[:, rows] = self.rigid_states(read, flights[0].origin)
+
+    def rigid_states(self, read: np.ndarray, origin: Origin) -> np.ndarray:
+        """Return position, velocity, attitude and body rates, (13, m), from values of the properties STATE, (m, 12)."""
+        moving = np.empty((10, len(read)))
         kernels.to_rigid_bodies(read, (origin.latitude, origin.longitude), FOOT, moving)
-        state[:3, rows] = origin.from_geodetic(np.stack([read[:, 0], read[:, 1], FOOT * read[:, 2]]))
-        state[3:, rows] = moving
+        place = origin.from_geodetic(np.stack([read[:, 0], read[:, 1], FOOT * read[:, 2]]))
+        return np.concatenate([place, moving])
 
     def _report(self, body: Any) -> None:
         """End the worlds of aircraft that have failed, or remove these."""
@@ -246,6 +264,13 @@ class JSBSimAircraft(RigidBodyModel):
                     body.remove(row)
                 else:
                     body.fail(row, flight.failure)
+
+
+def local_frames(origin: Origin, latitude: np.ndarray, longitude: np.ndarray) -> np.ndarray:
+    """Quaternions that turn vectors north, east, down at geodetic places (m,) [rad] to the world frame, (4, m)."""
+    frames = np.empty((4, len(latitude)))
+    kernels.local_frames(latitude, longitude, (origin.latitude, origin.longitude), frames)
+    return frames
 
 
 def above_sea_level(latitude: np.ndarray, altitude: np.ndarray) -> np.ndarray:
@@ -266,8 +291,8 @@ class JSBSimControl(JSBSimAircraft):
 
     Positive elevator lowers the nose, positive aileron the right wing; positive rudder turns the nose to the left in most aircraft.
 
-    Differences from SCRIMMAGE: the attitude and velocity of the entity count at the start; an aircraft can be named without
-    a script and trimmed; the throttle counts from the start on (there, after 0.05 s); latitudes are geodetic.
+    Differences from SCRIMMAGE: an aircraft can be named without a script and trimmed; engines run and the throttle counts from the
+    start on (there, after 0.05 s); the entity has not flown when it is born; the Earth is an ellipsoid.
 
     Raises:
         ParameterError: JSBSim is not installed, or cannot load or trim the aircraft.
@@ -293,8 +318,8 @@ class JSBSimModel(JSBSimAircraft):
     It sets the properties ap/bank_setpoint [rad], ap/altitude_setpoint [ft] and ap/airspeed_setpoint [knot]; the script switches the
     autopilot on. None of the aircraft of the package has a bank setpoint: `jsbsim_root` names the folder with yours.
 
-    Differences from SCRIMMAGE: latitudes are geodetic, positions are not rounded, the entity has not flown a step when it
-    is born, and it starts with its own velocity, if it has one.
+    Differences from SCRIMMAGE: the Earth is an ellipsoid, positions are not rounded, engines run at the start, the entity has not
+    flown a step when it is born, and it starts with its own attitude, and with its own velocity, if it has one.
 
     Raises:
         ParameterError: JSBSim is not installed, or cannot load the aircraft, or the aircraft has no such autopilot.

@@ -71,7 +71,7 @@ class FleetProcesses:
                 return ()
 
     def place(self, numbers: Sequence[int], places: np.ndarray, origin: Origin) -> Flown:
-        """Set the states of some aircraft; places are as in `JSBSimFlight.place`, (m, 15)."""
+        """Set the states of some aircraft; places are as in `JSBSimFlight.place`, (m, 17)."""
         return self._call("place", numbers, places, origin)
 
     def fly(self, numbers: Sequence[int], commands: np.ndarray, n_steps: int) -> Flown:

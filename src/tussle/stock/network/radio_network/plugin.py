@@ -29,6 +29,11 @@ class RadioNetwork(Network):
     A transmitter sends its messages one after another. With `half_duplex`, the messages of a step begin at a random time in the step,
     and a receiver that sends itself at some time of a message does not receive it. Whether a message is received is decided at the
     positions of the step in which it is published, even if it waits in the queue. Messages of several senders do not collide.
+
+    With `shared_bandwidth` the senders of a world use one channel in turn, as if a perfect protocol gave it to them: each sends its
+    messages of a step when those before it have sent theirs, by the order of ids, and `half_duplex` loses nothing. With
+    `propagation_speed`, such as 1,500 m/s for sound in water, a message arrives later by the distance over that speed; whether the
+    receiver sends then is judged by what it has to send when the message is published.
     """
 
     grade = "portable"
@@ -53,6 +58,13 @@ class RadioNetwork(Network):
     jammer_team = Param(NOBODY, doc="Team whose entities jam all receivers near them; -1 is none.")
     jammer_range = Param(100.0, unit="m", ge=0.0, doc="Distance at which a jammer is as strong as the noise.")
     bandwidth = Param(math.inf, gt=0.0, doc="Bandwidth of each sender [bit/s].")
+    shared_bandwidth = Param(False, doc="All senders of a world share the bandwidth, in turn.")
+    propagation_speed = Param(
+        math.inf,
+        unit="m/s",
+        gt=0.0,
+        doc="Speed of the signal; 1500 m/s for sound in water, inf for no delay.",
+    )
     overhead = Param(28.0, ge=0.0, doc="Bytes of a message beside 8 for each number; 28 are UDP over IPv4.")
     queue_limit = Param(
         math.inf, ge=0.0, doc="Bytes waiting at a sender above which new messages are dropped."
@@ -78,12 +90,13 @@ class RadioNetwork(Network):
         links.lose_across(w, PLANE, *plane)
         links.lose_hidden(w, BLOCKED, self.blocked_by)
         self._fade(w, links, world)
-        if self.half_duplex.any():
+        travel = links.distance / self.propagation_speed[world]
+        if (in_turn := self.half_duplex & ~self.shared_bandwidth).any():
             first, last = on_air[0][links.receiver], on_air[1][links.receiver]
-            is_busy = (first < end[message]) & (start[message] < last)
-            links.lose(HALF_DUPLEX, self.half_duplex[world] & is_busy)
+            is_busy = (first < end[message] + travel) & (start[message] + travel < last)
+            links.lose(HALF_DUPLEX, in_turn[world] & is_busy)
         links.lose_by_chance(w, CHANCE, "chance", self.prob_transmit)
-        delay = np.maximum(0.0, end - w.t[links.world])[message]
+        delay = np.maximum(0.0, (end - w.t[links.world])[message] + travel)
         if self.is_stochastic_delay.any():
             jitter = np.where(self.is_stochastic_delay, self.delay_jitter, 0.0)[world]
             delay += jitter * (2.0 * links.uniform(w, "delay") - 1.0)
@@ -132,6 +145,10 @@ class RadioNetwork(Network):
             offset = np.where(self.half_duplex[own], draw * np.maximum(0.0, w.dt - air), 0.0)
         k = len(size)
         span = np.zeros(k), np.zeros(k), np.zeros(k, bool)
-        limits, queue = (self.bandwidth, self.queue_limit, begin), (ahead, self.busy_until)
-        kernels.send(links.sender, links.world, size, limits, offset, queue, on_air, span)
+        channel = np.full(w.n_worlds, -np.inf)
+        np.maximum.at(channel, own, self.busy_until)
+        order = np.argsort(links.sender, kind="stable") if self.shared_bandwidth.any() else np.arange(k)
+        limits = self.bandwidth, self.queue_limit, begin, self.shared_bandwidth
+        queue = ahead, self.busy_until, channel
+        kernels.send(order, (links.sender, links.world), size, limits, offset, queue, on_air, span)
         return *span, on_air

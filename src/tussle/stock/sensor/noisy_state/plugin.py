@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from tussle.api import GroupView, Output, Param, Sensor
+import numpy as np
+
+from tussle.api import GroupView, Output, Param, Sensor, service
 from tussle.stock.sensor.noisy_state import kernels
 
 PAIR = "mean sd"
@@ -39,6 +41,11 @@ class NoisyState(Sensor):
     belief_quat = Output(
         "belief_quat_w belief_quat_x belief_quat_y belief_quat_z", doc="Believed attitude, body to world."
     )
+
+    @service
+    def velocity_noise(self, g: GroupView) -> np.ndarray:
+        """Return the standard deviations of the errors of the velocity [m/s], (3, n), world frame, for plugins that pass it on."""
+        return np.stack([self.vel_noise_0[1], self.vel_noise_1[1], self.vel_noise_2[1]])
 
     def step(self, g: GroupView) -> None:
         """Update the belief of all rows."""

@@ -10,6 +10,7 @@ from tussle.api import GroupView, Handle, HistoricAttributes, Param, Sensor, Sta
 from tussle.ros.altitude import FIELDS, altitude_type
 from tussle.ros.link import RosLink
 from tussle.ros.node import checked_namespace
+from tussle.ros.robot import height_above_floor
 
 
 class AltimeterTopic(NamedTuple):
@@ -23,7 +24,8 @@ class AltimeterTopic(NamedTuple):
 class ROSAltimeter(Sensor):
     """Publishes altitudes on altimeter (mavros_msgs/Altitude), in the robot's namespace.
 
-    The namespace is `vehicle_name`, or `ros_namespace_prefix` followed by the id if that is none; the frame is its base_link.
+    The namespace is `vehicle_name`, or `ros_namespace_prefix` followed by the id if that is none. The frame is the base_link of the
+    robot's `ROSAutonomy`; without one, that of its own namespace.
     amsl is the altitude above the ellipsoid, as `altitude_origin` is; monotonic is amsl at birth; local is z in the world frame,
     relative the height above the place of birth; terrain and bottom_clearance are the height above the highest surface of the scene at
     the place, or above z = 0 without one. Errors, equal in all fields but monotonic: a constant bias, drawn at birth, and white noise.
@@ -59,7 +61,7 @@ class ROSAltimeter(Sensor):
         type_ = altitude_type()
         link.advertise(f"{name}/altimeter", type_)
         message = type_()
-        message.header.frame_id = f"{name}/base_link"
+        message.header.frame_id = link.base_link(row.id, name)
         return AltimeterTopic(link, name, message)
 
     def spawn(self, g: GroupView, rows: np.ndarray) -> None:
@@ -71,8 +73,7 @@ class ROSAltimeter(Sensor):
     def step(self, g: GroupView) -> None:
         """Publish the measurements."""
         topics: Any = self.topic
-        surface = g.scene.height(g.pos[0], g.pos[1])
-        above = g.pos[2] - np.where(surface > -np.inf, surface, 0.0)
+        above = height_above_floor(g.scene, g.pos)
         amsl = g.scene.origin.to_geodetic(g.pos)[2]
         altitudes = np.array([amsl, g.pos[2], g.pos[2] - self.home[1], above, above])
         altitudes += self.offset + self.noise * g.normal("noise")

@@ -44,7 +44,7 @@ class CompassByROS(Sensor):
         link, own = self.link_type.of(row.shared), row.plugin.values
         given = own["vehicle_name"]
         name = checked_namespace(f"{own['ros_namespace_prefix']}{row.id}" if given == "none" else given)
-        return CompassTopic(link, link.compass(f"{name}/compass", f"{name}/base_link"))
+        return CompassTopic(link, link.compass(f"{name}/compass", link.base_link(row.id, name)))
 
     def step(self, g: GroupView) -> None:
         """Publish the measurements."""
@@ -61,8 +61,8 @@ class CompassByROS(Sensor):
 class ROSCompass(CompassByROS):
     """Publishes the unit vector to the North in the body frame on compass (sensor_msgs/MagneticField), in the robot's namespace.
 
-    The namespace is `vehicle_name`, or `ros_namespace_prefix` followed by the id if that is none; the frame is its base_link.
-    The measurement has no errors, and its size is no field strength.
+    The namespace is `vehicle_name`, or `ros_namespace_prefix` followed by the id if that is none. The frame is the base_link of
+    the robot's `ROSAutonomy`; without one, that of its own namespace. The measurement has no errors, and its size is no field strength.
 
     Raises:
         MissingExtraError: rospy is not installed.

@@ -20,7 +20,7 @@ class ImuTopic(NamedTuple):
     """Where the measurements of an entity go."""
 
     link: NodeLink
-    publish: Callable[[Any, list[float], list[float], list[float]], None]
+    publish: Callable[..., None]
 
 
 class ImuByROS(Sensor):
@@ -54,7 +54,7 @@ class ImuByROS(Sensor):
         link, own = self.link_type.of(row.shared), row.plugin.values
         given = own["vehicle_name"]
         name = checked_namespace(f"{own['ros_namespace_prefix']}{row.id}" if given == "none" else given)
-        return ImuTopic(link, link.imu(f"{name}/imu", f"{name}/base_link"))
+        return ImuTopic(link, link.imu(f"{name}/imu", link.base_link(row.id, name)))
 
     def spawn(self, g: GroupView, rows: np.ndarray) -> None:
         """Draw the biases."""
@@ -74,19 +74,23 @@ class ImuByROS(Sensor):
         )
         rate = quat_rotate_inverse(g.quat, g.omega) + self.bias[3:] + self.rate_noise * noise[3:]
         self.last_vel[:] = g.vel
+        variances = np.stack([
+            self.rate_bias**2 + self.rate_noise**2, self.acceleration_bias**2 + self.acceleration_noise**2
+        ])  # fmt: skip
         for row, (link, publish) in enumerate(topics):
             if link.lost:
                 g.fail(row, link.lost)
-            measured = g.quat[:, row].tolist(), rate[:, row].tolist(), force[:, row].tolist()
-            publish(link.stamp(float(g.t[row])), *measured)
+            columns = g.quat, rate, force, variances
+            publish(link.stamp(float(g.t[row])), *(column[:, row].tolist() for column in columns))
 
 
 class ROSIMUSensor(ImuByROS):
     """Publishes specific force, angular velocity and attitude on imu (sensor_msgs/Imu), in the robot's namespace.
 
     Specific force is the mean acceleration since the last measurement less gravity, and both vectors are in the body frame; a body at
-    rest measures 9.80665 m/s^2 upward. Errors: a constant bias of each axis, drawn at birth, and white noise. The attitude is that of
-    the body in the world frame, without errors.
+    rest measures 9.80665 m/s^2 upward. Errors: a constant bias of each axis, drawn at birth, and white noise; the covariances are theirs.
+    The attitude is that of the body in the world frame, without errors. The frame is the base_link of the robot's `ROSAutonomy`;
+    without one, that of its own namespace.
 
     The existing system publishes velocity and angle increments with the rotation of the Earth in fields of accelerations and rates,
     without errors.

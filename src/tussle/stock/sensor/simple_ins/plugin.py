@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tussle.api import GroupView, Output, Param, Sensor, State, Subscribe
+from tussle.api import GroupView, Output, Param, Sensor, State, Subscribe, service
 from tussle.messages import GPSStatus
 from tussle.numeric.quaternion import quat_conjugate, quat_from_euler, quat_multiply
 
@@ -56,6 +56,11 @@ class SimpleINS(Sensor):
 
     def spawn(self, g: GroupView, rows: np.ndarray) -> None:
         self.last_vel[:, rows] = g.vel[:, rows]
+
+    @service
+    def velocity_noise(self, g: GroupView) -> np.ndarray:
+        """Return the standard deviations of the errors of the velocity [m/s], (3, n), world frame, for plugins that pass it on."""
+        return np.stack([self.vel_noise_0[1], self.vel_noise_1[1], self.vel_noise_2[1]])
 
     def step(self, g: GroupView) -> None:
         """Update the belief of all rows."""

@@ -90,6 +90,7 @@ export function actionsOf(player) {
     customKey: () => player.order('key', { key: ';' }),
     anew: () => player.order('reset', { seed: Number(field('seed').value) }),
 
+    quantities: () => player.quantities.toggle(),
     help: dialog('help'),
     info: dialog('info'),
     // Escape may have closed it while a key is down on its button.

@@ -3,7 +3,8 @@
 
 import { byId, cleared, element, eventText } from './formatting.js';
 import { between } from './geometry.js';
-import { lastWhere, Layer } from './layer.js';
+import { Layer } from './layer.js';
+import { lastWhere } from './ordered.js';
 import { Clock } from './timeline.js';
 
 /** Colours that are told apart with every kind of colour vision; the shapes tell them apart as well. @type {Record<string, string>} */

@@ -10,6 +10,15 @@ export function number(value, digits = 0) {
   return (value < 0 && Number(value.toFixed(digits)) !== 0 ? '−' : '') + grouped + (rest ? '.' + rest : '');
 }
 
+/** A number with its four most significant digits; nothing of one that is not known. @param {number} value */
+export function amount(value) {
+  if (!Number.isFinite(value)) return '–';
+  if (Number.isInteger(value)) return number(value);
+  if (Math.abs(value) < 1e-3 || Math.abs(value) >= 1e7) return value.toExponential(3).replace('-', '−').replace(/\.?0+e/, 'e');
+  const digits = Math.max(0, 3 - Math.floor(Math.log10(Math.abs(value))));
+  return number(value, digits).replace(/(\.\d*?)0+$/, '$1').replace(/\.$/, '');
+}
+
 /** A length in the unit that suits it. @param {number} metres */
 export function length(metres) {
   if (metres >= 1000) return `${number(metres / 1000, metres % 1000 ? 1 : 0)} km`;
@@ -69,10 +78,15 @@ export function say(node, text = '') {
   if (node.textContent !== text) node.textContent = text;
 }
 
-/** Fill a list with names and values. @param {Element} list @param {[string, string][]} rows */
+/** Fill a list with names and values; a third text says what a name is. @param {Element} list @param {[string, string, string?][]} rows */
 export function fillList(list, rows) {
   if (list.children.length !== 2 * rows.length) list.replaceChildren(...rows.flatMap(() => [element('dt'), element('dd')]));
-  rows.flat().forEach((text, i) => say(list.children[i], text));
+  rows.forEach(([name, text, about = ''], i) => {
+    const [title, value] = [list.children[2 * i], list.children[2 * i + 1]];
+    say(title, name);
+    say(value, text);
+    if (title.getAttribute('title') !== about) title.setAttribute('title', about);
+  });
 }
 
 /** A value of the page's style. @param {string} name */

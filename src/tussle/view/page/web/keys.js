@@ -39,6 +39,7 @@ const KEYS = [
     [[';'], 'send a key to the plugins', 'customKey'],
   ]],
   ['Page', [
+    [['q'], 'quantities over time', 'quantities'],
     [['h', '?'], 'keys', 'help'],
     [['i'], 'about this run', 'info'],
     [['d'], 'settings', 'settings'],
@@ -71,7 +72,7 @@ export function fillHelp(box, isLive) {
 /** Whether an element takes a key itself. @param {EventTarget | null} target @param {string} key */
 function takesKey(target, key) {
   if (!(target instanceof HTMLElement)) return false;
-  if (target instanceof HTMLInputElement && target.type === 'number') return true;
+  if (target instanceof HTMLSelectElement || (target instanceof HTMLInputElement && ['number', 'text'].includes(target.type))) return true;
   if (target instanceof HTMLInputElement && target.type === 'range') return target.id !== 'time' && key.startsWith('Arrow');
   return Boolean(target.closest('button, input[type="checkbox"]')) && (key === ' ' || key === 'Enter');
 }

@@ -1,8 +1,9 @@
 // A game: its entities, where they are, and its events. The two subclasses are a recording (recorded.js) and a live game (live.js).
-/** @import { Curves, EventRow, GameEvent, PageData, Sample, Vector } from './types' */
+/** @import { EventRow, GameEvent, PageData, Sample, Vector } from './types' */
 
 import { minus, norm, scaled } from './geometry.js';
 import { Moment } from './chunk.js';
+import { SeriesBook } from './series.js';
 
 export const NO_TEAM = { id: 0, name: '', colour: [150, 160, 172] };
 /** Moments so long before and after what is shown are compared for a velocity [s]; the first that differ count. */
@@ -25,15 +26,12 @@ export class Layer {
     this.shown = new Moment();
     this.start = 0;
     this.end = 0;
-    /** Entities of each team at some times. */
-    this.curves = this.emptyCurves();
+    /** Names of the results of metrics, interactions and networks. @type {string[]} */
+    this.results = [];
+    /** Quantities over time. */
+    this.series = new SeriesBook();
     /** A move above this is a jump [m]. */
     this.leap = 0.25 * norm(minus(page.scenery.high, page.scenery.low));
-  }
-
-  /** @returns {Curves} */
-  emptyCurves() {
-    return { t: [], n: this.page.teams.map(() => /** @type {number[]} */ ([])) };
   }
 
   /** Whether what is shown stays as it is until something new comes. */
@@ -66,11 +64,15 @@ export class Layer {
     chunk.id.forEach((id, k) => this.blockOf.set(id, chunk.block[k]));
   }
 
+  /** Number of an entity in its own run. @param {number} id */
+  number(id) {
+    return this.page.idShift && id > this.page.idShift ? id - this.page.idShift : id;
+  }
+
   /** Name of an entity. @param {number} id */
   who(id) {
     const block = this.page.blocks[this.blockOf.get(id)];
-    const number = this.page.idShift && id > this.page.idShift ? id - this.page.idShift : id;
-    return block ? `${block.name} ${number}` : `${number}`;
+    return block ? `${block.name} ${this.number(id)}` : `${this.number(id)}`;
   }
 
   /** @param {number} id */
@@ -93,13 +95,6 @@ export class Layer {
   /** @param {number} slot */
   colourOf(slot) {
     return this.colour(this.shown.block[slot], this.shown.team[slot]);
-  }
-
-  /** Entities of each team that are shown. */
-  counts(moment = this.shown) {
-    const found = new Map(this.page.teams.map(({ id }) => [id, 0]));
-    for (let i = 0; i < moment.n; i++) found.set(moment.team[i], (found.get(moment.team[i]) || 0) + 1);
-    return this.page.teams.map(({ id }) => found.get(id));
   }
 
   /** @param {number} id */
@@ -153,20 +148,4 @@ export class Layer {
       if (places.length > 1) lay(id, places, times);
     }
   }
-}
-
-/** The last of n numbers from 0 for which a condition holds that holds for all before it; -1 without one. @param {number} n @param {(i: number) => boolean} holds */
-export function lastWhere(n, holds) {
-  let [low, high] = [-1, n];
-  while (high - low > 1) {
-    const middle = (low + high) >> 1;
-    if (holds(middle)) low = middle;
-    else high = middle;
-  }
-  return low;
-}
-
-/** Number of the last time that is not after a time; -1 without one. @param {ArrayLike<number>} times @param {number} t */
-export function lastNotAfter(times, t, slack = 1e-9) {
-  return lastWhere(times.length, (i) => times[i] <= t + slack);
 }

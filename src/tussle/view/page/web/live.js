@@ -1,16 +1,13 @@
 // A live game: its newest frame, and those before, for the trails.
-/** @import { Curves, EventRow, PageData, Sample, Status } from './types' */
+/** @import { Change, EventRow, PageData, Sample, Section, Status } from './types' */
 
 import { Chunk, Moment } from './chunk.js';
 import { Approach, fillBetween } from './interpolation.js';
-import { lastWhere, Layer } from './layer.js';
+import { Layer } from './layer.js';
+import { lastWhere } from './ordered.js';
 
 /** States of past frames that are kept; of more, every other frame goes. */
 const MOST_PAST = 1e6;
-/** A look back over more seconds than this is for the curves. */
-const WHOLE = 5e8;
-/** Moments of the curves; of more, every other one goes. */
-const MOST_MOMENTS = 600;
 
 export class Live extends Layer {
   /** @param {PageData} page @param {() => void} changed */
@@ -23,7 +20,6 @@ export class Live extends Layer {
     this.epoch = -1;
     /** @type {Moment[]} */
     this.past = [];
-    this.scores = this.emptyCurves();
     /** The newest state; `shown` approaches it. */
     this.newest = this.shown;
     this.approach = new Approach();
@@ -56,32 +52,25 @@ export class Live extends Layer {
     if (!(this.past[this.past.length - 1]?.t >= newest.t)) this.keep([...this.past, newest]);
     this.approach.take(newest.t, performance.now() / 1000, isJump);
     this.show();
-    cut(this.curves, newest.t);
-    append(this.curves, newest.t, this.counts(newest));
     this.changed();
   }
 
-  /** Take what was seen before. @param {{ epoch: number, seconds: number }} header @param {Uint8Array} bytes */
-  takePast({ epoch, seconds }, bytes) {
+  /** Take changes of quantities. @param {{ results: string[], changes: Change[] }} message */
+  takeCurves({ results, changes }) {
+    this.results = results;
+    this.series.take(changes);
+    this.changed();
+  }
+
+  /** Take what was seen before. @param {{ epoch: number }} header @param {Uint8Array} bytes */
+  takePast({ epoch }, bytes) {
     if (epoch !== this.epoch) return;
     const chunk = new Chunk(bytes, this.page);
     this.meet(chunk);
     const moments = Array.from(chunk.times, (_, i) => new Moment(chunk.nTracks).fill(chunk, i));
-    if (seconds > WHOLE) {
-      this.fillCurves(moments);
-    } else {
-      const known = new Set(this.past.map(({ t }) => t));
-      this.keep([...this.past, ...moments.filter(({ t }) => !known.has(t))].sort((a, b) => a.t - b.t));
-    }
+    const known = new Set(this.past.map(({ t }) => t));
+    this.keep([...this.past, ...moments.filter(({ t }) => !known.has(t))].sort((a, b) => a.t - b.t));
     this.changed();
-  }
-
-  /** Count the entities of the time before this page was opened. @param {Moment[]} moments */
-  fillCurves(moments) {
-    const known = structuredClone(this.curves);
-    cut(this.curves, -Infinity);
-    for (const moment of moments) if (!(moment.t >= known.t[0])) append(this.curves, moment.t, this.counts(moment));
-    known.t.forEach((t, i) => append(this.curves, t, known.n.map((values) => values[i])));
   }
 
   /** @param {Moment[]} past */
@@ -100,11 +89,13 @@ export class Live extends Layer {
       this.rows = [...this.rows.slice(0, from), ...rows];
       this.setEvents(this.rows);
     }
-    if (Object.keys(status.scores).length) {
-      cut(this.scores, status.t);
-      append(this.scores, status.t, this.page.teams.map(({ id }) => status.scores[id] ?? 0));
-    }
     this.changed();
+  }
+
+  /** Columns of an entity's plugins, and its messages. @param {number} id @returns {Section[]} */
+  sectionsOf(id) {
+    const entity = this.status?.entity;
+    return entity?.id === id ? entity.sections.slice(1) : [];
   }
 
   /** Move what is shown on towards the newest state. @param {number} seconds */
@@ -134,20 +125,5 @@ export class Live extends Layer {
     const past = this.past.filter(({ t }) => t >= now - seconds && t < now);
     const stride = Math.max(1, Math.ceil(past.length / most));
     return past.filter((_, i) => (past.length - i) % stride === 0).reverse();
-  }
-}
-
-/** Forget what curves have of a time and later ones. @param {Curves} curves @param {number} t */
-function cut(curves, t) {
-  const n = lastWhere(curves.t.length, (i) => curves.t[i] < t) + 1;
-  for (const values of [curves.t, ...curves.n]) values.length = n;
-}
-
-/** @param {Curves} curves @param {number} t @param {number[]} row a value for each team */
-export function append(curves, t, row) {
-  curves.t.push(t);
-  row.forEach((value, i) => curves.n[i].push(value));
-  if (curves.t.length > MOST_MOMENTS) {
-    for (const values of [curves.t, ...curves.n]) values.splice(0, values.length, ...values.filter((_, i) => i % 2 === 0));
   }
 }

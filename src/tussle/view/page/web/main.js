@@ -35,6 +35,11 @@ function publish(player) {
     get ids() { return [...layer.shown.ids()]; },
     get events() { return structuredClone(layer.marked); },
     get status() { return 'status' in layer ? structuredClone(layer.status) : null; },
+    /** Changes of a quantity: time and value of each. @param {string} name @param {number | null} team @param {number} id */
+    curve(name, team = null, id = 0) {
+      const { t, v } = layer.series.of(name, team, id);
+      return t.map((time, i) => [time, v[i]]);
+    },
     get shapes() { return picture.shapes.header.parts.map(({ kind, n }) => [kind, n]); },
     get trailPoints() { return picture.trails.n; },
     /** Place of an entity [m], and its attitude (w, x, y, z); null where it is not there. @param {number} id */

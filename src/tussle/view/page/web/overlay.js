@@ -3,7 +3,8 @@
 /** @import { Colour, View } from './types' */
 
 import { parseColour, rgb, styled } from './formatting.js';
-import { lastWhere, Layer } from './layer.js';
+import { Layer } from './layer.js';
+import { lastWhere } from './ordered.js';
 import { pixelOf } from './camera.js';
 import { KINDS } from './events.js';
 

@@ -1,13 +1,16 @@
 // The cards on the page: title, teams, scores, the chosen entity, what is known of the run.
-/** @import { Curves, Mode, PageData, Status, Team } from './types' */
+/** @import { Mode, PageData, Status, Team } from './types' */
 
-import { byId, cleared, element, fillList, length, number, rgb, say, styled } from './formatting.js';
-import { between, forward, norm } from './geometry.js';
-import { lastNotAfter, NO_TEAM } from './layer.js';
-import { append, Live } from './live.js';
+import { amount, byId, cleared, element, fillList, length, number, rgb, say, styled } from './formatting.js';
+import { between, forward, minus, norm } from './geometry.js';
+import { NO_TEAM } from './layer.js';
+import { Live } from './live.js';
 import { Recorded } from './recorded.js';
+import { steps } from './series.js';
+/** @import { Series } from './series.js' */
 
-const CURVE_POINTS = 240;
+/** Settings in which two runs differ that are shown at once. */
+const MOST_DIFFERING = 4;
 
 export class Panels {
   /** @param {PageData} page @param {Live | Recorded} layer @param {Set<number>} hidden teams @param {() => void} changed */
@@ -21,7 +24,13 @@ export class Panels {
     this.fillHead();
     this.teams = page.teams.map((team) => this.makeTeam(team));
     this.scores = page.teams.map((team) => this.makeRow(element('div', 'score'), 'scores', team, element('b')));
-    this.scored = layer instanceof Live ? layer.scores : this.captures();
+    for (const { name, title, teams } of page.runs || []) {
+      const first = this.teams.find(({ team }) => teams.includes(team.id));
+      first?.row.before(element('h3', 'run', `${name}: ${title}`));
+    }
+    /** What the card of scores shows. */
+    this.scored = layer instanceof Live || page.teams.some(({ id }) => layer.series.has('score', id)) ? 'score' : 'captures';
+    say(document.querySelector('#scores h2'), this.scored === 'score' ? 'Score' : 'Captures');
     this.fillInfo();
   }
 
@@ -35,13 +44,15 @@ export class Panels {
     say(document.querySelector('#head h1'), page.title);
     if (!this.status) {
       const seed = page.facts.find(([name]) => name === 'Seed')?.[1];
-      const n = `${number(page.nEntities)} ${page.nEntities === 1 ? 'entity' : 'entities'}`;
+      const n = `${page.nEntities.map((each) => number(each)).join(' and ')} ${String(page.nEntities) === '1' ? 'entity' : 'entities'}`;
       const seconds = `${number(layer.end - layer.start, 1).replace(/\.0$/, '')} s`;
       say(byId('subtitle'), [seed && `seed ${seed}`, n, seconds].filter(Boolean).join(' · '));
     }
+    const differing = page.differing?.map(([path, a, b]) => `${path} ${a} and ${b}`) || [];
+    const more = differing.length > MOST_DIFFERING ? ` and ${differing.length - MOST_DIFFERING} more, see About` : '';
+    const settings = differing.length ? ` · settings of A and B: ${differing.slice(0, MOST_DIFFERING).join(', ')}${more}` : '';
     byId('lead').hidden = !page.lead;
-    say(byId('lead'), page.lead);
-    say(document.querySelector('#scores h2'), this.status ? 'Score' : 'Captures');
+    say(byId('lead'), (page.lead || '') + settings);
     this.showNotes(page.notes);
     if (!page.isComplete) this.notice('This run was cut short: what there is of it is shown', true);
   }
@@ -118,69 +129,55 @@ export class Panels {
     say(box.querySelector('.small'), `Made by ${page.generator}.${whole}`);
   }
 
-  /** Show entities and score of each team, with the curves up to a time. @param {number} t */
+  /** Show entities left and born and the score of each team, with the curves up to a time. @param {number} t */
   showTeams(t) {
-    const { layer, scored } = this;
-    const counts = layer.counts();
+    const { layer: { series }, scored } = this;
+    const left = this.teams.map(({ team }) => series.of('left', team.id));
     this.teams.forEach(({ team, count, most, curve }, i) => {
-      const highest = Math.max(1, counts[i], ...layer.curves.n[i]);
-      say(count, number(counts[i]));
-      say(most, ` / ${number(highest)}`);
-      this.drawCurve(curve, layer.curves, i, [0, highest], t, team);
+      say(count, number(left[i].at(t) || 0));
+      say(most, ` / ${number(series.of('born', team.id).at(t) || 0)}`);
+      this.drawCurve(curve, left[i], [0, left[i].range([0, 1])[1]], t, team);
     });
-    byId('scores').hidden = !scored.t.length;
-    const now = lastNotAfter(scored.t, t);
-    const all = scored.n.flat();
+    const scores = this.scores.map(({ team }) => series.of(scored, team.id));
+    const range = scores.reduce((sum, each) => each.range(sum), [0, 1e-9]);
+    if (!(this.layer instanceof Live)) fillList(byId('metrics'), this.resultsAt(t));
+    byId('scores').hidden = !scores.some(({ t: times }) => times.length) && !byId('metrics').children.length;
     this.scores.forEach(({ row, team, value, curve }, i) => {
-      row.hidden = !scored.n[i].some(Boolean);
-      const score = scored.n[i][now] ?? 0;
-      say(value, number(score, Number.isInteger(score) ? 0 : 2));
-      this.drawCurve(curve, scored, i, [Math.min(0, ...all), Math.max(1e-9, ...all)], t, team);
+      row.hidden = !scores[i].t.length;
+      say(value, amount(scores[i].at(t)));
+      this.drawCurve(curve, scores[i], range, t, team);
     });
   }
 
-  /** Captures of each team over time: of a recording, which has only the last scores. */
-  captures() {
-    const { layer, page } = this;
-    const found = layer.emptyCurves();
-    const sums = page.teams.map(() => 0);
-    for (const { t, kind, id } of layer.events) {
-      const i = kind === 'capture' ? page.teams.findIndex((team) => team.id === layer.teamOf(id).id) : -1;
-      if (i < 0) continue;
-      if (!found.t.length) append(found, layer.start, sums);
-      append(found, t, sums);
-      sums[i]++;
-      append(found, t, sums);
-    }
-    return found;
+  /** Recorded results at a time, without scores. @param {number} t @returns {[string, string][]} */
+  resultsAt(t) {
+    const { layer: { results, series }, page } = this;
+    /** Names, teams and ids of the worlds and teams that have results. @type {[string, number | null, number][]} */
+    const owners = [...(page.runs || [{ name: '' }]).map(({ name }, i) => /** @type {[string, null, number]} */ ([name, null, i && page.idShift])),
+      ...page.teams.map(({ id, name }) => /** @type {[string, number, number]} */ ([name || `team ${id}`, id, 0]))];
+    return results.filter((name) => !name.endsWith('.score')).map((name) => [
+      name.replace('.', ' ').replaceAll('_', ' '),
+      owners.filter(([, team, id]) => series.has(name, team, id)).map(([owner, team, id]) => `${owner} ${amount(series.of(name, team, id).at(t))}`.trim()).join(', '),
+    ]);
   }
 
   /**
    * Draw a curve over the whole game, and in colour up to now.
-   * @param {HTMLCanvasElement} canvas @param {Curves} curves @param {number} i which of them @param {number[]} range @param {number} t @param {Team} team
+   * @param {HTMLCanvasElement} canvas @param {Series} series @param {number[]} range @param {number} t @param {Team} team
    */
-  drawCurve(canvas, { t: at, n }, i, [lowest, highest], t, team) {
+  drawCurve(canvas, series, [lowest, highest], t, team) {
     const { start, end } = this.layer;
     const [width, height] = [canvas.clientWidth, canvas.clientHeight];
     if (!width) return;
     const pen = cleared(canvas);
     const x = (/** @type {number} */ time) => between((time - start) / (end - start || 1), 0, 1) * (width - 6) + 2;
     const y = (/** @type {number} */ value) => height - 2 - ((value - lowest) / (highest - lowest || 1)) * (height - 5);
-    const stride = Math.max(1, Math.floor(at.length / CURVE_POINTS));
-    const traced = (/** @type {number} */ last) => {
-      const path = new Path2D();
-      for (let k = 0; k < last; k += stride) path.lineTo(x(at[k]), y(n[i][k]));
-      if (last >= 0) path.lineTo(x(at[last]), y(n[i][last]));
-      return path;
-    };
     pen.globalAlpha = 0.45;
     pen.strokeStyle = styled('--muted');
-    pen.stroke(traced(at.length - 1));
-    const now = lastNotAfter(at, t);
-    if (now < 0) return;
-    const path = traced(now);
-    const value = y(n[i][now]);
-    path.lineTo(x(t), value);
+    pen.stroke(steps(series, end, x, y));
+    const value = y(series.at(t));
+    if (Number.isNaN(value)) return;
+    const path = steps(series, t, x, y);
     pen.globalAlpha = 1;
     pen.strokeStyle = pen.fillStyle = rgb(team.colour);
     pen.lineWidth = 1.6;
@@ -189,7 +186,7 @@ export class Panels {
     knob.arc(x(t), value, 2.4, 0, 2 * Math.PI);
     pen.fill(knob);
     path.lineTo(x(t), height - 1);
-    path.lineTo(x(at[0]), height - 1);
+    path.lineTo(x(series.t[0]), height - 1);
     pen.globalAlpha = 0.25;
     pen.fill(path);
   }
@@ -207,11 +204,10 @@ export class Panels {
     }
   }
 
-  /** Show columns of plugins and messages of a live game's entity. @param {number} id */
+  /** Show columns of plugins, and messages of a live game's entity. @param {number} id */
   showSections(id) {
     const box = byId('sections');
-    const entity = this.status?.entity;
-    const sections = entity?.id === id ? entity.sections.slice(1) : [];
+    const sections = this.layer.sectionsOf(id);
     const titles = sections.map(([title]) => title).join('\n');
     if (titles !== this.titles) box.replaceChildren(...sections.map(([title]) => element('section', '', '', element('h3', '', title), element('dl'))));
     this.titles = titles;
@@ -220,12 +216,13 @@ export class Panels {
 
   /** @param {number} id @param {number} t @returns {[string, string][]} */
   factsOf(id, t) {
-    const { layer } = this;
+    const { layer, page } = this;
     const slot = layer.slotOf(id);
     const team = slot >= 0 ? layer.teams.get(layer.shown.team[slot]) || NO_TEAM : layer.teamOf(id);
+    const { teamShift } = page.runs?.find(({ teams }) => teams.includes(team.id)) || { teamShift: 0 };
     const nCaptures = layer.events.filter((event) => event.kind === 'capture' && event.id === id && event.t <= t).length;
     return [
-      ['Team', team.name || `team ${team.id}`],
+      ['Team', team.name || `team ${team.id - teamShift}`],
       ...(slot >= 0 ? this.stateOf(slot) : [this.absence(id, t)]),
       .../** @type {[string, string][]} */ (nCaptures ? [['Captures', `${nCaptures}`]] : []),
     ];
@@ -243,8 +240,9 @@ export class Panels {
 
   /** @param {number} slot @returns {[string, string][]} */
   stateOf(slot) {
-    const { shown } = this.layer;
-    const [east, north, up] = shown.placeIn(slot);
+    const { layer: { shown }, page } = this;
+    const isSecond = page.shift && shown.id[slot] > page.idShift;
+    const [east, north, up] = minus(shown.placeIn(slot), isSecond ? page.shift : [0, 0, 0]);
     const nose = forward(shown.quat.subarray(4 * slot, 4 * slot + 4));
     const heading = ((Math.atan2(nose[1], nose[0]) * 180) / Math.PI + 360) % 360;
     const health = shown.health[slot];

@@ -165,6 +165,7 @@ export class Picture {
     for (const [text, ...place] of drawn.shapes ? this.shapes.header.texts : []) overlay.writeAt(view, place, text, overlay.ink, size, { must: true, gap: 0 });
     for (const { name, colour, top } of drawn.regions ? scenery.regions : []) overlay.writeAt(view, top, name, overlay.soft(colour), 12);
     for (const { name, colour, end } of drawn.grid ? scenery.ends : []) overlay.writeAt(view, end, name, overlay.soft(colour), 11, { gap: 3 });
+    for (const [text, place] of this.player.page.signs || []) overlay.writeAt(view, place, text, overlay.ink, 16, { must: true, gap: 0 });
     const { spacing, nearer } = scenery.cell(view);
     const where = scenery.data.hasGround ? '' : ', no ground';
     say(byId('scale'), drawn.grid ? `grid ${length(nearer > 0.4 ? spacing : 10 * spacing)}${where}` : '');

@@ -11,13 +11,14 @@ import { TRAIL_LENGTHS, TRAIL_OF_CHOSEN } from './trails.js';
 import { EventLine } from './events.js';
 import { LiveClock, RecordedClock } from './timeline.js';
 import { Panels } from './panels.js';
+import { QuantityPanel } from './quantities.js';
 import { Steering } from './steering.js';
 import { Viewpoint } from './viewpoint.js';
 import { fillHelp, listen } from './keys.js';
 import { actionsOf, listenToSettings } from './actions.js';
 
-/** Longer than any game [s]. */
-const WHOLE_GAME = 1e9;
+/** As far as it is looked back for the longest trails [s]. */
+const LONGEST_LOOK = 1e8;
 /** Time over which drawn frames are counted [ms]. */
 const RATE_SPAN = 4000;
 /** Least time between two looks back for the trails [ms]. */
@@ -76,14 +77,13 @@ export class Player {
     this.clock = layer instanceof Live ? new LiveClock(layer, source) : new RecordedClock(layer, page);
     this.events = new EventLine(layer, this.clock, (event) => this.jump(event));
     this.panels = new Panels(page, layer, this.hidden, () => this.look());
+    this.quantities = new QuantityPanel(this);
     this.steering = new Steering(this.canvas, this);
     drawn.labels = layer.mostAtOnce <= FEW.labels;
     drawn.trail = page.hasTrails || layer.mostAtOnce <= FEW.trails ? TRAIL_LENGTHS.indexOf(page.hasTrails ? 10 : 5) : 0;
     this.listen();
     this.resize();
     this.viewpoint.open();
-    // For the curves, and for the trails.
-    this.order('history', { seconds: WHOLE_GAME });
     this.lookBack();
     this.isReady = true;
     if (window.matchMedia('(hover: hover)').matches) this.say('h shows the keys');
@@ -114,6 +114,7 @@ export class Player {
           else if (isSparse) this.lookBackSoon();
           resolve();
         },
+        curves: (message) => layer.takeCurves(message),
         past: (header, bytes) => layer.takePast(header, bytes),
         drawn: (header, bytes) => {
           this.picture.shapes.take(header, bytes);
@@ -144,7 +145,7 @@ export class Player {
   lookBack() {
     this.lookedBack = performance.now();
     const seconds = TRAIL_LENGTHS[this.drawn.trail] || TRAIL_OF_CHOSEN;
-    this.order('history', { seconds: Math.min(seconds, 0.1 * WHOLE_GAME) });
+    this.order('history', { seconds: Math.min(seconds, LONGEST_LOOK) });
   }
 
   /** Look back once `LOOK_PERIOD` is over. */
@@ -231,6 +232,7 @@ export class Player {
     this.picture.draw();
     this.panels.showTeams(clock.t);
     this.panels.showChosen(this.chosen, this.camera.mode, clock.t);
+    this.quantities.show(clock.t);
     this.events.update(clock.t);
     clock.show(clock.t, clock.isPlaying, clock.speed);
     this.showButtons();

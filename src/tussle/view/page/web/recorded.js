@@ -1,15 +1,18 @@
 // A recorded run, whose chunks are unpacked when they are first needed.
-/** @import { EventRow, PageData, Sample, ShapesHeader, Source } from './types' */
+/** @import { Change, EventRow, PageData, Sample, Section, ShapesHeader, Source } from './types' */
 
 import { between } from './geometry.js';
 import { Reader, readMessage } from './packing.js';
 import { Chunk } from './chunk.js';
-import { lastNotAfter, lastWhere, Layer } from './layer.js';
+import { ColumnChunk } from './columns.js';
+import { Layer } from './layer.js';
+import { lastNotAfter, lastWhere } from './ordered.js';
+import { OF_TEAMS } from './series.js';
 
 /** States that are kept unpacked, at some 45 bytes each; the chunks that were used last stay. */
 const MOST_STATES = 4e6;
 
-/** Groups of frames whose shapes are kept. */
+/** Groups of frames whose shapes, and chunks whose columns, are kept. */
 const MOST_SHAPES = 4;
 
 export class Recorded extends Layer {
@@ -23,7 +26,8 @@ export class Recorded extends Layer {
     this.reading = new Set();
     /** Shapes of plugins: groups of frames, each from a frame on. @type {Map<number, { frame: number, header: ShapesHeader, bytes: Uint8Array }[]>} */
     this.shapes = new Map();
-    this.curves = page.curves;
+    /** Columns of plugins by chunk. @type {Map<number, ColumnChunk>} */
+    this.columns = new Map();
     this.times = new Float64Array(0);
     this.slack = 0;
   }
@@ -37,6 +41,10 @@ export class Recorded extends Layer {
     /** @type {EventRow[]} */
     const rows = JSON.parse(new TextDecoder().decode(await this.source.blob('events')));
     this.setEvents(rows);
+    /** @type {Change[]} */
+    const changes = JSON.parse(new TextDecoder().decode(await this.source.blob('curves')));
+    this.series.take(changes);
+    this.results = [...new Set(changes.map(({ name }) => name))].filter((name) => !OF_TEAMS.includes(name));
   }
 
   get mostAtOnce() {
@@ -134,6 +142,32 @@ export class Recorded extends Layer {
     this.reading.delete(name);
     if (this.shapes.size > MOST_SHAPES) this.shapes.delete(this.shapes.keys().next().value);
     this.changed();
+  }
+
+  /** Columns of a chunk; null where there are none, or they have to be read first. @param {number} number */
+  columnsOf(number) {
+    if (!this.page.columns.length) return null;
+    const found = this.columns.get(number);
+    if (!found) this.readColumns(number).catch(this.failed);
+    return found;
+  }
+
+  /** @param {number} number */
+  async readColumns(number) {
+    const name = `columns-${number}`;
+    if (this.reading.has(name)) return;
+    this.reading.add(name);
+    const [first, last] = this.page.chunks[number];
+    this.columns.set(number, new ColumnChunk(await this.source.blob(name), first, last - first + 1, this.page.columns));
+    this.reading.delete(name);
+    if (this.columns.size > MOST_SHAPES) this.columns.delete(this.columns.keys().next().value);
+    this.changed();
+  }
+
+  /** Columns of an entity's plugins that were recorded. @param {number} id @returns {Section[]} */
+  sectionsOf(id) {
+    const { frame } = this.shown;
+    return this.columnsOf(this.chunkOf(frame))?.sections(frame, id) || [];
   }
 
   /** @param {number} t */

@@ -27,7 +27,10 @@ class SocketSource extends RangeSource {
     this.socket = new WebSocket(ADDRESS.replace('http', 'ws'));
     this.socket.binaryType = 'arraybuffer';
     this.socket.addEventListener('message', ({ data }) => {
-      if (typeof data === 'string') return hear.status(JSON.parse(data));
+      if (typeof data === 'string') {
+        const message = JSON.parse(data);
+        return hear[/** @type {'status' | 'curves'} */ (message.kind)](message);
+      }
       const [header, bytes] = readMessage(new Uint8Array(data));
       return hear[/** @type {'frame' | 'past' | 'drawn'} */ (header.kind)](header, bytes);
     });

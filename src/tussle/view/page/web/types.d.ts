@@ -9,8 +9,12 @@ export interface Team { id: number; name: string; colour: number[]; }
 export interface Block { name: string; team: number; colour: number[]; model: string; lengths: number[]; views: FieldOfView[]; }
 /** What a plugin sees: full angles [degrees], of a cone where there is no elevation; range [m], or none; place and attitude on the body. */
 export interface FieldOfView { plugin: string; azimuth: number; elevation: number | null; range: number | null; pos: number[]; quat: number[]; }
-/** Values of each team at some times. */
-export interface Curves { t: number[]; n: number[][]; }
+/** A column of plugins that was recorded: a component per field, or one without fields. */
+export interface Column { name: string; kind: 'float' | 'int' | 'bool'; fields: string[]; units: string[]; doc: string; }
+/** Title, and names, values and descriptions. */
+export type Section = [string, [string, string, string?][]];
+/** Changes of a quantity of a team, an entity or the world; null where it is not known. */
+export interface Change { name: string; team: number | null; id: number; from: number; t: number[]; v: (number | null)[]; }
 export interface GameEvent { t: number; kind: string; id: number; other: number; text: string; }
 export type EventRow = [t: number, kind: string, id: number, other: number, text: string];
 
@@ -29,8 +33,9 @@ export interface PageData {
   reach: number; scale: number; hasTrails: boolean; notes: string[]; facts: [string, string][]; idShift: number;
   isComplete: boolean; attitudeUnit: number; healthSteps: number;
   // Of a recorded run.
-  nFrames?: number; nStates?: number; nEntities?: number; mostAtOnce?: number; chunks?: [number, number][]; curves?: Curves; positionError?: number;
-  angleError?: number; begins?: number; warp?: number | null; isPlaying?: boolean; lead?: string; shapeFrames?: number;
+  nFrames?: number; nStates?: number; nEntities?: number[]; mostAtOnce?: number; chunks?: [number, number][]; positionError?: number;
+  angleError?: number; begins?: number; runs?: { name: string; title: string; teams: number[]; teamShift: number }[]; shift?: Vector; signs?: [string, Vector][]; differing?: [string, string, string][]; quantities?: [string, string][];
+  warp?: number | null; isPlaying?: boolean; lead?: string; shapeFrames?: number; columns?: Column[];
   // Of a live game.
   seed?: number; endTime?: number | null; dt?: number;
 }
@@ -38,9 +43,9 @@ export interface PageData {
 /** State of a live game, sent four times a second. */
 export interface Status {
   t: number; step: number; span: [number, number]; epoch: number; seed: number; isPaused: boolean; isOver: boolean; isSeeking: boolean;
-  warp: number | null; reached: number; rate: number; notes: string[]; error: string | null; scores: Record<string, number>;
-  metrics: [string, string][]; events: { from: number; rows: EventRow[] }; refusal: string | null; steers: boolean;
-  entity: { id: number; sections: [string, [string, string][]][] } | null;
+  warp: number | null; reached: number; rate: number; notes: string[]; error: string | null; metrics: [string, string][];
+  events: { from: number; rows: EventRow[] }; refusal: string | null; steers: boolean;
+  entity: { id: number; sections: Section[]; quantities: [string, string][] } | null;
 }
 
 /** Shapes of plugins, see drawing.py. */
@@ -55,7 +60,7 @@ export interface Source {
   send?(command: string, fields?: object): void;
 }
 export interface MessageHandlers {
-  status(status: Status): void; frame(header: { epoch: number }, bytes: Uint8Array): void; lost(): void;
+  status(status: Status): void; curves(message: { results: string[]; changes: Change[] }): void; frame(header: { epoch: number }, bytes: Uint8Array): void; lost(): void;
   past(header: { epoch: number; seconds: number }, bytes: Uint8Array): void; drawn(header: ShapesHeader, bytes: Uint8Array): void;
 }
 

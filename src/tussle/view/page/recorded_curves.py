@@ -1,0 +1,111 @@
+"""Quantities over time of a recorded run, for the page."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from tussle.api.bodies import derived_from
+from tussle.errors import ParameterError
+from tussle.view.recording import Recording
+from tussle.view.series import Changes, CurveName
+
+COLUMNS = {
+    "x": "m", "y": "m", "z": "m", "vx": "m/s", "vy": "m/s", "vz": "m/s", "speed": "m/s", "yaw": "rad", "climb": "rad", "roll": "rad",
+    "health": "",
+}  # fmt: skip
+"""Columns of a recorded entity, and their units."""
+MOST_POINTS = 20_000
+"""Frames of a recording from which a column is read; of more, every other one, every third, …"""
+
+
+def run_changes(run: Recording, team_shift: int = 0, id_shift: int = 0) -> list[Changes]:
+    """Return the entities left in each team, from the frames; those born and the captures made, from the events; recorded results.
+
+    Args:
+        run: The run.
+        team_shift: What is added to the numbers of the teams.
+        id_shift: The id of the run's world.
+    """
+    team_of = {
+        event.id: run.block_teams[run.blocks.index(event.text)]
+        for event in run.events
+        if event.kind == "birth" and event.text in run.blocks
+    }
+    changes = [*_left(run)]
+    for team in run.teams:
+        born = [e.t for e in run.events if e.kind == "birth" and team_of.get(e.id) == team]
+        changes.append(_counted(CurveName("born", team), float(run.t[0]), born))
+    by_team = {
+        team: [e.t for e in run.events if e.kind == "capture" and team_of.get(e.id) == team]
+        for team in run.teams
+    }
+    if any(by_team.values()):
+        changes += [_counted(CurveName("captures", team), float(run.t[0]), t) for team, t in by_team.items()]
+    changes += [Changes(CurveName(name, team), 0, *found) for (name, team), found in run.results.items()]
+    return [_shifted(each, team_shift, id_shift) for each in changes]
+
+
+def _shifted(changes: Changes, team_shift: int, id_shift: int) -> Changes:
+    q = changes.quantity
+    q = q._replace(id=id_shift) if q.team is None else q._replace(team=q.team + team_shift)
+    return Changes(q, 0, changes.t, changes.values)
+
+
+def _left(run: Recording) -> Iterable[Changes]:
+    """Entities of each team, counted in the frames in which their number may have changed."""
+    is_changed = np.diff(run.counts, prepend=-1) != 0
+    times = [e.t for e in run.events if e.kind in ("birth", "death")]
+    for side in ("left", "right"):
+        places = np.searchsorted(run.t, times, side=side)
+        is_changed[places[places < run.n_frames]] = True
+    frames = np.flatnonzero(is_changed)
+    counts = np.array([[(run.team_column(int(i)) == team).sum() for team in run.teams] for i in frames])
+    for team, n in zip(run.teams, counts.T, strict=True):
+        is_new = np.diff(n, prepend=-1) != 0
+        yield Changes(CurveName("left", team), 0, run.t[frames[is_new]].tolist(), n[is_new].tolist())
+
+
+def _counted(quantity: CurveName, start: float, times: list[float]) -> Changes:
+    """Number of events up to each time."""
+    t, n = np.unique(np.array(times, float), return_counts=True)
+    values = np.cumsum(n)
+    if not len(t) or t[0] > start:
+        t, values = np.append(start, t), np.append(0, values)
+    return Changes(quantity, 0, t.tolist(), values.tolist())
+
+
+def column_changes(run: Recording, who: int, name: str, id_shift: int = 0) -> Changes:
+    """Return a column of an entity over the frames; NaN in those without it.
+
+    Args:
+        run: The run.
+        who: The entity.
+        name: One of `COLUMNS`.
+        id_shift: What is added to its id.
+
+    Raises:
+        ParameterError: There is no such column.
+    """
+    if name not in COLUMNS:
+        raise ParameterError(f"{run.path}: there is no column {name!r}; there are {', '.join(COLUMNS)}")
+    stride = -(-run.n_frames // MOST_POINTS)
+    frames = range(0, run.n_frames, stride)
+    values = np.array([_value(run, i, who, name) for i in frames])
+    is_new = np.append(True, ~((values[1:] == values[:-1]) | (np.isnan(values[1:]) & np.isnan(values[:-1]))))
+    return Changes(
+        CurveName(name, None, who + id_shift), 0, run.t[::stride][is_new].tolist(), values[is_new].tolist()
+    )
+
+
+def _value(run: Recording, i: int, who: int, name: str) -> float:
+    row = run.row_of(i, who)
+    if row < 0:
+        return np.nan
+    if name == "speed":
+        return float(np.linalg.norm([run.value(row, axis) for axis in ("vx", "vy", "vz")]))
+    if name in ("yaw", "climb", "roll"):
+        quat = np.array([[run.value(row, axis)] for axis in ("qw", "qx", "qy", "qz")])
+        return float(derived_from(name, quat)[0])
+    return run.value(row, name)

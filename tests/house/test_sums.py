@@ -1,0 +1,47 @@
+"""Python's `sum` of floats compensates for rounding since 3.12; what a game depends on is added by `tussle.numeric.total`."""
+
+import ast
+from pathlib import Path
+
+from tree import ROOT
+
+PLACES = (
+    "aircraft",
+    "contacts",
+    "geodesy.py",
+    "historic",
+    "neighbors",
+    "numeric",
+    "plan",
+    "prism.py",
+    "rays",
+    "scene.py",
+    "shapes.py",
+    "stock",
+)
+WHOLE = {
+    "src/tussle/rays/files.py": "vertices of the faces of a file",
+    "src/tussle/stock/autonomy/moos/wire.py": "lengths of messages",
+    "src/tussle/stock/autonomy/rl_simple/actors.py": "actors with whole actions",
+    "src/tussle/stock/autonomy/rl_simple/remote.py": "actors with whole actions",
+}
+"""Modules that sum whole numbers."""
+
+
+def sums(path: Path) -> bool:
+    """Return whether a module calls Python's `sum`."""
+    calls = (
+        node for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))) if isinstance(node, ast.Call)
+    )
+    return any(isinstance(call.func, ast.Name) and call.func.id == "sum" for call in calls)
+
+
+def test_no_law_calls_the_sum_whose_rounding_depends_on_the_version_of_python() -> None:
+    package = ROOT / "src" / "tussle"
+    files = [
+        file
+        for place in PLACES
+        for file in ([package / place] if place.endswith(".py") else (package / place).rglob("*.py"))
+    ]
+    found = {str(file.relative_to(ROOT)) for file in files if sums(file)}
+    assert found == set(WHOLE), "take tussle.numeric.total"
