@@ -503,7 +503,10 @@ class Recording:
         """Colours and models of the entities."""
         known = {block.name: block for block in self.mission.blocks} if self.mission else {}
         blocks = [known.get(name) for name in self.blocks]
-        boxes, views = [b and b.box for b in blocks], [fields_of_view(b) if b else () for b in blocks]
+        boxes, views = (
+            [b.box if b else None for b in blocks],
+            [fields_of_view(b) if b else () for b in blocks],
+        )
         return Style(self.blocks, self.block_teams, self._plugins, self.viewer, boxes, views)
 
     @cached_property

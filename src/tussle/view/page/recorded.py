@@ -292,7 +292,7 @@ def game_facts(game: Recording | Comparison) -> list[tuple[str, str]]:
         settings = [(path, f"A {a}, B {b}") for path, a, b in game.differing]
         return settings + [(f"{name}: {key}", value) for name, run in both for key, value in game_facts(run)]
     info, t = game.run.info, game.t
-    named = lambda team: game.teams.get(int(team)) or f"team {team}"  # noqa: E731
+    names = {str(team): name for team, name in game.teams.items()}
     worlds = info.get("worlds", [])
     facts = [("Run", game.path.resolve().name)]
     if game.world < len(worlds):
@@ -305,7 +305,7 @@ def game_facts(game: Recording | Comparison) -> list[tuple[str, str]]:
                 (
                     "Score",
                     ", ".join(
-                        f"{named(team)}: {displays.number(float(score))}"
+                        f"{names.get(str(team)) or f'team {team}'}: {displays.number(float(score))}"
                         for team, score in world["scores"].items()
                     ),
                 )
