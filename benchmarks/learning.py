@@ -34,10 +34,13 @@ from tussle.rl import (
     make_vec,
     parallel_env,
 )
+from tussle.rl.flight import registered_task
 from tussle.rl.teams import Fire
 from tussle.stock import Learned, Unicycle
 
 EPISODE = 100
+SHIPPED = ("Battle", "Formation", "PreyEscape", "CaptureTheFlag")
+"""Tasks that ship whose rewards or rules look at others."""
 
 
 class Prey(PredatorPrey):
@@ -205,12 +208,18 @@ def main() -> None:
     parser.add_argument("--json", type=Path)
     options = parser.parse_args()
     tag, s = Tag(time_limit=10.0), options.seconds
+    shipped = [registered_task(f"tussle/{name}-v0", "the benchmark") for name in SHIPPED]
     rows = {
         "prey, make_swarm": swarm_case(Prey, 64, s),
         "battle, make_swarm": swarm_case(Battle, 1, s),
         "tag, make_swarm": swarm_case(tag, 4096, s),
+        **{
+            f"{name}, shipped": swarm_case(task, round(7000 / len(task.agent_names)), s)
+            for name, task in zip(SHIPPED, shipped, strict=True)
+        },
         "prey, make_vec": vector_case(Prey, 64, s),
         "prey, PettingZoo": parallel_case(Prey, s),
+        "Battle, PettingZoo": parallel_case(shipped[0].replace(time_limit=10.0), s),
     }
     print(f"{'':20} agents worlds floats  M agent-steps/CPU s  engine alone")
     for name, row in rows.items():

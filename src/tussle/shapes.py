@@ -58,9 +58,14 @@ class Volume(ABC):
         """Outward unit normals at points of the surface [m], (3, n)."""
         return -_unit(self.inward(pos))
 
-    def crossed(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
-        """Return True if a point of the straight way from a to b [m], (3, n) each, lies inside, (n,)."""
-        found: np.ndarray = self.contains(a) | self.contains(b)
+    def crossed(self, a: np.ndarray, b: np.ndarray, among: np.ndarray | None = None) -> np.ndarray:
+        """Return True if a point of the straight way from a to b [m], (3, n) each, lies inside, (n,); of those `among` all."""
+        found: np.ndarray
+        if among is not None:
+            rows, found = np.flatnonzero(among), np.zeros(len(among), np.bool_)
+            found[rows] = self.crossed(a[:, rows], b[:, rows])
+            return found
+        found = np.asarray(self.contains(a) | self.contains(b))
         rest = np.flatnonzero(~found & (a != b).any(axis=0))
         if len(rest):
             with np.errstate(over="ignore", invalid="ignore"):
@@ -94,8 +99,8 @@ class Convex(Volume):
     def contains(self, pos: np.ndarray) -> np.ndarray:
         return _applied(volumes.contained, (self._face_columns,), pos)
 
-    def crossed(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
-        return _applied(volumes.crossed, (self._face_columns,), a, b)
+    def crossed(self, a: np.ndarray, b: np.ndarray, among: np.ndarray | None = None) -> np.ndarray:
+        return _applied(volumes.crossed, (self._face_columns,), a, b, among=among)
 
     def inward(self, pos: np.ndarray) -> np.ndarray:
         """Opposite to the normals of the faces that a position lies beyond."""
@@ -302,8 +307,8 @@ class Sphere(Volume):
     def contains(self, pos: np.ndarray) -> np.ndarray:
         return _applied(volumes.sphere_contained, (self.center, self.radius), pos)
 
-    def crossed(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
-        return _applied(volumes.sphere_crossed, (self.center, self.radius), a, b)
+    def crossed(self, a: np.ndarray, b: np.ndarray, among: np.ndarray | None = None) -> np.ndarray:
+        return _applied(volumes.sphere_crossed, (self.center, self.radius), a, b, among=among)
 
     def inward(self, pos: np.ndarray) -> np.ndarray:
         """Towards the centre."""
@@ -331,10 +336,12 @@ class Sphere(Volume):
         return np.where(moving & (inward >= 0.0) & (first >= 0.0), first, np.inf)
 
 
-def _applied(law: Callable[..., None], shape: tuple[Any, ...], *points: np.ndarray) -> np.ndarray:
-    """What a kernel of a shape says of points or ways, (3, n) each: (n,)."""
+def _applied(
+    law: Callable[..., None], shape: tuple[Any, ...], *points: np.ndarray, among: np.ndarray | None = None
+) -> np.ndarray:
+    """What a kernel of a shape says of points or ways, (3, n) each: (n,); false for others than those `among` them."""
     flat = [np.ascontiguousarray(np.reshape(pos, (3, -1)), float) for pos in points]
-    out = np.empty(flat[0].shape[1], np.bool_)
+    out = np.ones(flat[0].shape[1], np.bool_) if among is None else np.array(among, np.bool_)
     law(*shape, *flat, out)
     return out.reshape(np.shape(points[0])[1:])
 

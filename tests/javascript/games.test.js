@@ -222,6 +222,12 @@ test('curves are steps, broken where a quantity is not known', () => {
   const same = (value) => value;
   steps(({ t: [0, 2, 5, 6], v: [4, 1, NaN, 3] }), 7, same, same);
   assert.deepEqual(drawn, [['move', 0, 4], ['line', 2, 4], ['line', 2, 1], ['line', 5, 1], ['move', 6, 3], ['line', 7, 3]]);
+  drawn.length = 0;
+  const many = Array.from({ length: 1000 }, (_, i) => i);
+  steps(({ t: [...many, 1000], v: [...many.map((i) => (i % 2 ? 9 : 5)), 7] }), 1001, (t) => t / 100, same);
+  assert.ok(drawn.length < 120, 'as many as fall on half a pixel are one line');
+  const levels = drawn.map(([, , level]) => level);
+  assert.deepEqual([Math.min(...levels), Math.max(...levels), levels[levels.length - 1]], [5, 9, 7]);
 });
 
 test('a place in an ordered list is found', () => {

@@ -137,8 +137,8 @@ def analyse(
     Raises:
         ParameterError: There is no such quantity or point.
     """
+    asked = list(dict.fromkeys(map(results.canonical, quantities)))  # adds a note on recorded columns
     notes, info = list(results.notes), results.info
-    asked = list(dict.fromkeys(map(results.canonical, quantities)))
     chosen, looked_at = asked or results.defaults.all, asked or results.defaults.leading
     has_points = len(results.points) > 1
     return Analysis(

@@ -8,7 +8,7 @@ from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from tussle.batch.target import Answer, Answers
+from tussle.batch.target import ChoiceAnswer, Answers
 from tussle.batch.variables import Range, Variable
 from tussle.mission.codecs import written
 
@@ -35,7 +35,7 @@ def further_runs(answers: Answers, info: Mapping[str, Any], path: Path | None) -
     if answers.over is not None and (info.get("over") or len(answers.notes)):
         asked += ["--over", answers.over.name]
     found = []
-    if wanted := answers.wanted:
+    if wanted := answers.wanted():
         n = RUNS if info["n_seeds"] < RUNS else 2 * int(info["n_seeds"])
         words = [
             *without(command[2:], COUNTS),
@@ -59,7 +59,7 @@ def further_runs(answers: Answers, info: Mapping[str, Any], path: Path | None) -
     return found
 
 
-def values_between(answer: Answer, over: Variable) -> list[str]:
+def values_between(answer: ChoiceAnswer, over: Variable) -> list[str]:
     """Values that were not played, between the smallest that reaches the target and the one below, as a mission file has them."""
     if answer.gap is None:
         return []

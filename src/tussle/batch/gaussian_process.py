@@ -226,7 +226,7 @@ def variance_parts(
     def variance(of: Sequence[np.ndarray]) -> np.ndarray:
         """Variance of the mean over all other axes, of each draw, (N_DRAWS,)."""
         inner = np.prod(of, axis=0) - np.prod(product, axis=0)
-        return kernel.amplitude**2 * np.maximum((alpha * (inner @ alpha)).sum(axis=0), 0.0)
+        return np.asarray(kernel.amplitude**2 * np.maximum((alpha * (inner @ alpha)).sum(axis=0), 0.0))
 
     of_fit = variance(square)
     whole_of_it = np.maximum(of_fit + noise, 1e-300)

@@ -35,6 +35,7 @@ from tussle.batch.statistics import (
     paired_difference,
     share_of,
 )
+from tussle.batch.store import RUNS
 from tussle.batch.survival import N_TIMES, Survival, survival_of
 from tussle.batch.target import Answers, Layout, Target, answers_of, crossing_of
 from tussle.batch.variables import Choice, Range, Variable
@@ -43,7 +44,7 @@ from tussle.displays import counted, line, listing, page, table
 from tussle.errors import ParameterError, listed
 from tussle.mission.codecs import written as text_of
 from tussle.palette import colour_of, on_paper
-from tussle.record.run import check_frames, frame_of
+from tussle.record.run import check_frames, frame_of, load_run
 
 if TYPE_CHECKING:
     from tussle.batch.store import StoredBatch
@@ -193,13 +194,15 @@ class Results:
         """A number of each run, (n,); NaN where it failed.
 
         Args:
-            expression: A name such as "score[2]", or arithmetic with names.
+            expression: A name such as "score[2]", or arithmetic with names. A recorded column of plugins, such as "Boids.goal.x[1]", is its
+                mean over the states of a team, and NaN for runs that are not recorded.
             runs: Numbers of the runs; None for all that are finished, in order.
 
         Raises:
             ParameterError: There is no such name, or a run is not finished.
         """
-        values = Quantity.parse(expression).evaluate(self._columns)
+        parsed = Quantity.parse(expression)
+        values = parsed.evaluate(self._columns_for(parsed))
         if runs is None:
             return values
         wanted = np.asarray(list(runs), dtype=np.int64)
@@ -208,6 +211,39 @@ class Results:
         if not is_there.all():
             raise ParameterError(f"run {wanted[~is_there][0]} is not among the {self.n_runs} finished runs")
         return values[place]
+
+    def _columns_for(self, quantity: Quantity) -> dict[str, np.ndarray]:
+        """The numbers of the runs, with the columns of plugins if the quantity names something else."""
+        try:
+            quantity.names(self._columns)
+        except ParameterError:
+            return self._columns | self._recorded
+        return self._columns
+
+    @cached_property
+    def _recorded(self) -> dict[str, np.ndarray]:
+        """Mean of each recorded column of plugins over the states of a team, (n,); NaN for runs that are not recorded."""
+        found: dict[str, np.ndarray] = {}
+        n_recorded, folder = 0, self.path or Path()
+        for row, number in enumerate(self._run.tolist() if self.path else ()):
+            place = folder / RUNS / f"{number:06d}"
+            run = load_run(place, is_mapped=True) if place.exists() else None
+            if run is None or not run.is_complete or not run.columns:
+                continue
+            n_recorded += 1
+            parts = [part for column in run.columns.values() for part in column.parts]
+            by_team = run.trajectory_table.group_by("team", use_threads=False)
+            means = by_team.aggregate([(part, "mean") for part in parts]).to_pylist()
+            for each in means:
+                for part in parts:
+                    if each[f"{part}_mean"] is not None:
+                        name = column_name(part, each["team"])
+                        found.setdefault(name, np.full(self.n_runs, np.nan))[row] = each[f"{part}_mean"]
+        if found:
+            self.notes.append(
+                f"columns of plugins are known of {counted(n_recorded, 'run')}, with which they were recorded"
+            )
+        return found
 
     def shares(self, point: int | None = None) -> list[Share]:
         """Games that each team won, and ties, with Wilson's interval; nothing for games without scores.
@@ -315,7 +351,8 @@ class Results:
         Raises:
             ParameterError: There is no such quantity.
         """
-        return Quantity.parse(expression).canonical(self._columns)
+        parsed = Quantity.parse(expression)
+        return parsed.canonical(self._columns_for(parsed))
 
     def is_share(self, expression: str) -> bool:
         """Return whether a quantity is a share: its interval is within 0 and 1.
@@ -326,9 +363,9 @@ class Results:
             ParameterError: There is no such quantity.
         """
         quantity = Quantity.parse(expression)
-        names = quantity.names(self._columns)
-        is_count = names == [expression] and metric_of(expression) in COUNTED
-        return quantity.is_share or (not is_count and is_within_one(quantity.evaluate(self._columns)))
+        columns = self._columns_for(quantity)
+        is_count = quantity.names(columns) == [expression] and metric_of(expression) in COUNTED
+        return quantity.is_share or (not is_count and is_within_one(quantity.evaluate(columns)))
 
     @property
     def diminished(self) -> list[int]:
@@ -413,8 +450,8 @@ class Results:
         except ParameterError:  # too few points for a curve
             return found
         name = found.over.name
-        placed = (replace(a, crossing=crossing_of(fit, asked, name, a.values)) for a in found.answers)
-        return replace(found, answers=tuple(placed))
+        with_fit = (replace(a, crossing=crossing_of(fit, asked, name, a.values)) for a in found.answers)
+        return replace(found, answers=tuple(with_fit))
 
     def select(self, text: str) -> list[int]:
         """The points at which variables have the values that a text such as "tactic=keep, prey_speed=20" names.

@@ -32,6 +32,9 @@ from tussle.record.run_file import Timings, plain, versions
 MOST_AT_ONCE = 100_000
 """Runs that an executor gets at once, about: more would only take memory."""
 
+LONG_ROUND = 4.0
+"""CPU time of a round [s] from which on other processes are worth their start."""
+
 FIRST_SEEDS = 20
 """Seeds of the first round of a batch that may stop; each further round doubles them."""
 
@@ -83,6 +86,7 @@ class _Runner:
 
     def __post_init__(self) -> None:
         self.progress = Progress(self.plan.n_runs)
+        self._cpu_s = 0.0  # of all finished runs [s]
 
     @property
     def is_enough(self) -> bool:
@@ -126,7 +130,7 @@ class _Runner:
         self._report()
         for runs in () if self.is_enough else self._rounds(done):
             self.batch.check(None if self.stop is None else self.stop.rule)
-            player = executor or self.batch.executor(n_runs=len(runs))
+            player = executor or self._executor(len(runs))
             if self.may_crash and isinstance(player, InProcess):
                 player = Processes(1, player.stack)
             with closing(player.play(self.batch.package, runs)) as messages:
@@ -140,12 +144,20 @@ class _Runner:
                     if self.is_enough:
                         return
 
+    def _executor(self, n_runs: int) -> Executor:
+        """This process for a round that is shorter, by the games so far, than it takes to start others; else what the batch chooses."""
+        n = self.progress.n_done
+        if n and n_runs * self._cpu_s / n < LONG_ROUND:
+            return InProcess()
+        return self.batch.executor(n_runs=n_runs)
+
     def _report(self) -> None:
         if self.on_progress is not None:
             self.on_progress(self.progress)
 
     def _count(self, finished: Finished) -> None:
         self.progress.count(finished)
+        self._cpu_s += finished.cpu_s
         if self.stop is not None:
             self.stop.add(finished)
 

@@ -10,13 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from tussle.batch.response import Response, fitted
+from tussle.batch.response import FEWEST_POINTS, Response, fitted
 from tussle.batch.statistics import BOOTSTRAP_FROM, LEVEL, SEED, scipy_package
 from tussle.batch.variables import Variable
 from tussle.errors import MissingExtraError
 
-FROM_POINTS = 8
-"""Fewest points for parts of the variance by a fit, and four for each variable."""
 N_RESAMPLES = 200
 MOST_LEVELS = 30
 """Largest number of levels of a factor in an analysis of variance."""
@@ -204,7 +202,7 @@ def _by_fit(
 ) -> list[Effect]:
     """Return the parts of the variance of the runs by a smooth fit, for points of any sample."""
     y = _means(matrix)
-    n, needed = int(np.isfinite(y).sum()), max(FROM_POINTS, 4 * len(variables))
+    n, needed = int(np.isfinite(y).sum()), max(FEWEST_POINTS, 2 * len(variables) + 1)
     if n < needed or np.nanmax(y) == np.nanmin(y):
         return _without_parts(
             found, f"they take {needed} points" if n < needed else "the quantity does not vary"

@@ -168,22 +168,21 @@ class SequentialStop:
         while True:
             needed = np.arange(int(n.max()))[:, None] < n
             yield np.flatnonzero(needed).tolist()
-            is_open = self._is_open(n)
-            grows = is_open & (n < most)
+            grows = self._is_open(n, most) & (n < most)
             if not grows.any():
                 break
             n = np.where(
                 grows, np.minimum(np.maximum(np.ceil(GROWTH * n), n + FIRST_SEEDS), most).astype(n.dtype), n
             )
-        self.is_met = not is_open.any()
+        self.is_met = not self._is_open(n, math.inf).any()
         self.n_seeds = max(int(n.max()), self.n_least)
 
-    def _is_open(self, n: np.ndarray) -> np.ndarray:
-        """Points that need further seeds, (n_points,), by the first n games of each."""
+    def _is_open(self, n: np.ndarray, most: float) -> np.ndarray:
+        """Points with less than `most` games that need further seeds, (n_points,), by the first n games of each."""
         is_open = np.ones(len(n), bool)
         if self.rule.target is not None:
             is_open[:] = False
-            is_open[self._answers(self.rule.target, n).wanted] = True
+            is_open[self._answers(self.rule.target, n).wanted(most)] = True
         if self.rule.width is not None:
             games = self._games.matrix(self.rule.width.quantity, n)
             known = games[np.isfinite(games)]

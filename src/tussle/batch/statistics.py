@@ -316,8 +316,10 @@ def means_of(name: str, rows: Sequence[np.ndarray], *, is_share: bool = False) -
         quantiles = np.quantile(same, QUANTILES, axis=1).T if n else np.tile(nothing[:, None], len(QUANTILES))
         numbers = zip(places, *(v.tolist() for v in (mean, low, high, sd, quantiles)), strict=True)
         for i, m, lower, upper, spread, q in numbers:
-            ends = within_one(m, lower, upper, n) if is_share and n else (lower, upper)
-            found[i] = Mean(name, n, m, *ends, spread, dict(zip(QUANTILES, q, strict=True)))
+            found[i] = Mean(name, n, m, lower, upper, spread, dict(zip(QUANTILES, q, strict=True)))
+            if is_share and n:
+                narrow = within_one(m, lower, upper, n)
+                found[i] = replace(found[i], low=narrow[0], high=narrow[1])
     return [found[i] for i in range(len(rows))]
 
 

@@ -170,7 +170,7 @@ def _first(x: np.ndarray, y: np.ndarray, target: Target) -> float:
 
 
 @dataclass(frozen=True)
-class Answer:
+class ChoiceAnswer:
     """The answer for one choice, that is one value of each variable that is no number.
 
     Attributes:
@@ -215,10 +215,11 @@ class Answer:
         place = self.levels.index(self.smallest) if self.smallest is not None else 0
         return (self.levels[place - 1].high, self.levels[place].low) if place and self.is_decided else None
 
-    def wanted(self, target: Target) -> list[Level]:
-        """The open values from which more games would narrow the answer.
+    def wanted(self, target: Target, most: float = math.inf) -> list[Level]:
+        """The open values with less than `most` games of which more would narrow the answer.
 
-        That is from the smallest that may reach the target to the smallest that is known or seems to reach it.
+        That is from the smallest that may reach the target to the smallest that is known or seems to reach it; if `most` games did not
+        tell of that one, to the next.
         """
         if self.is_decided:
             return []
@@ -226,7 +227,7 @@ class Answer:
         for level in self.levels:
             if level.state == "reached":
                 break
-            if level.state == "open":
+            if level.state == "open" and level.n < most:
                 found.append(level)
                 if target.is_reached(level.mean):
                     break
@@ -248,7 +249,7 @@ class Answers:
     target: Target
     title: str
     over: Variable | None
-    answers: tuple[Answer, ...]
+    answers: tuple[ChoiceAnswer, ...]
     notes: list[str] = field(default_factory=list)
 
     @property
@@ -256,21 +257,19 @@ class Answers:
         """All answers are decided."""
         return all(answer.is_decided for answer in self.answers)
 
-    @property
-    def wanted(self) -> list[int]:
-        """The points of which more games would narrow an answer."""
-        return sorted(
-            {p for answer in self.answers for level in answer.wanted(self.target) for p in level.points}
-        )
+    def wanted(self, most: float = math.inf) -> list[int]:
+        """The points with less than `most` games of which more would narrow an answer."""
+        levels = (level for answer in self.answers for level in answer.wanted(self.target, most))
+        return sorted({point for level in levels for point in level.points})
 
     def sentences(self) -> list[str]:
         """One sentence for each choice."""
         return [self._sentence(answer) + self._fitted(answer) for answer in self.answers]
 
-    def _fitted(self, answer: Answer) -> str:
+    def _fitted(self, answer: ChoiceAnswer) -> str:
         return "" if answer.crossing is None else f"; by a smooth fit it takes {answer.crossing.text}"
 
-    def _sentence(self, answer: Answer) -> str:
+    def _sentence(self, answer: ChoiceAnswer) -> str:
         whose = f"{answer.label}: " if answer.label else ""
         smallest, first = answer.smallest, answer.at_least
         if self.over is None:
@@ -473,5 +472,5 @@ def answers_of(
             of_choice.append(
                 Level(min(x), max(x), numbers, len(observed), mean, low, high, target.state(low, high))
             )
-        found.append(Answer(values, tuple(of_choice)))
+        found.append(ChoiceAnswer(values, tuple(of_choice)))
     return Answers(target, title, layout.over, tuple(found), list(layout.notes))

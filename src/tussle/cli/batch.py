@@ -37,7 +37,7 @@ from tussle.cli.interrupt import Interrupt, Interrupted
 from tussle.cli.options import ending_by_time, show_notes
 from tussle.cli.play import check_hash, record, simulate
 from tussle.cli.progress import ProgressMeter, clock, compiling, times
-from tussle.cli.tables import estimate, fact_list, number_tables, title
+from tussle.cli.tables import estimate, fact_list, indented, number_tables, title
 from tussle.cli.terminal import OK, PLUGIN_FAILED, RUNS_FAILED, put, say, say_error, say_note
 from tussle.errors import BatchError, ParameterError, RecordError
 from tussle.record import load_run
@@ -403,14 +403,14 @@ def answer_tables(
             style = "green" if level is answer.smallest else "dim" if level.state == "missed" else ""
             cells = [*map(written, answer.values.values()), *([level.text] if answers.over else [])]
             rows.append((style, [*cells, f"{level.n:,}", mean, interval.removesuffix(")"), level.state]))
-    held = "the intervals of a choice hold together, and whenever one stops: 95 % (confidence sequences, Bonferroni)"
-    found: list[RenderableType] = [Text(f" {sentence}", "bold") for sentence in answers.sentences()]
+    held = "the intervals of a choice hold together, and whenever one stops, with 95 % (confidence sequences, Bonferroni)"
+    found: list[RenderableType] = [indented(Text(s, "bold")) for s in answers.sentences()]
     found += [
         *number_tables(head, rows),
-        *(Text(f" {note}", "dim italic") for note in (held, *answers.notes)),
+        *(indented(Text(note, "dim italic")) for note in (held, *answers.notes)),
     ]
     for what, command in further_runs(answers, results.info, results.path):
-        found += [Text(f" {what}:", "dim"), Text(f" {command}", no_wrap=True)]
+        found += [indented(Text(f"{what}:", "dim")), Text(f" {command}", no_wrap=True)]
     return found
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from tussle.neighbors.kernels import KEY_BITS, cell_of, lower_bound, rank_bits
 from tussle.neighbors.lane_count import LANES
 from tussle.neighbors.lanes import below, bits, choose, lane_of, load, lowest, ones, splat
-from tussle.numeric.kernel import device, kernel
+from tussle.numeric.kernel import device, kernel, lean_device
 
 ANY, SAME, DIFFERENT = 0, 1, 2
 
@@ -39,7 +39,7 @@ ROUNDING_CELLS = 1e-6
 """Bound of the rounding error of pos / cell, in cells: positions reach 2^30 cells at 53 bits."""
 
 
-@device
+@lean_device
 def squares(sx, sy, sz, p, x, y, z):
     """Squared distances of places p to p + 7 from a point."""
     dx = load(sx, p) - x
@@ -48,7 +48,7 @@ def squares(sx, sy, sz, p, x, y, z):
     return dx * dx + dy * dy + dz * dz
 
 
-@device
+@lean_device
 def chosen(hit, team, p, mode, wanted):
     """Bits of `hit` whose team passes the filter."""
     if mode == ANY:
@@ -57,7 +57,7 @@ def chosen(hit, team, p, mode, wanted):
     return hit & same if mode == SAME else hit & ~same
 
 
-@device
+@lean_device
 def range_run(me, x, y, z, radius2, mode, wanted, table, start, end, found, done):
     """Append the places in [start, end) nearer than the radius to `found`, up to its size; an empty `found` only counts.
 
@@ -82,7 +82,7 @@ def range_run(me, x, y, z, radius2, mode, wanted, table, start, end, found, done
     return done
 
 
-@device
+@lean_device
 def first_strip(keys, strip_start, start, end, shift, row):
     """First of the strips [start, end) whose cell row is at least `row`."""
     while start < end:
@@ -94,7 +94,7 @@ def first_strip(keys, strip_start, start, end, shift, row):
     return start
 
 
-@device
+@lean_device
 def in_range(w, me, x, y, z, radius, mode, wanted, table, found, done):
     """Append the places of world w nearer than `radius` to (x, y, z), without `me`, to `found` in order; see `range_run`."""
     world_start, keys, strip_start, world_strip, inverse_cell = (
@@ -133,7 +133,7 @@ def in_range(w, me, x, y, z, radius, mode, wanted, table, found, done):
     return done
 
 
-@device
+@lean_device
 def insert(square, rank, place, best, ranks, places, k):
     """Insert a candidate into the k best by (squared distance, rank). Returns the squared distance that later ones must not exceed."""
     if square > best[k - 1] or (square == best[k - 1] and rank > ranks[k - 1]):
@@ -150,7 +150,7 @@ def insert(square, rank, place, best, ranks, places, k):
     return best[k - 1]
 
 
-@device
+@lean_device
 def nearest_run(me, x, y, z, mode, wanted, table, mask, start, end, worst, best, ranks, places, k):
     """Insert the places in [start, end) into the k best. Returns the squared distance that later ones must not exceed."""
     keys, sx, sy, sz, team = table[1], table[5], table[6], table[7], table[8]
@@ -167,7 +167,7 @@ def nearest_run(me, x, y, z, mode, wanted, table, mask, start, end, worst, best,
     return worst
 
 
-@device
+@lean_device
 def least_square(x, y, z, mode, wanted, table, start, end, least):
     """Smallest squared distance per lane among `least` and the places in [start, end) that pass the filter."""
     sx, sy, sz, team = table[5], table[6], table[7], table[8]
@@ -182,14 +182,14 @@ def least_square(x, y, z, mode, wanted, table, start, end, least):
     return least
 
 
-@device
+@lean_device
 def too_far(cells, cell, worst):
     """Return True if everything `cells` cells away is farther than sqrt(worst) for any rounding error."""
     gap = (cells - 1.0 - ROUNDING_CELLS) * cell
     return gap > 0.0 and gap * gap * (1.0 - 1e-12) > worst
 
 
-@device
+@lean_device
 def nearest_in_strip(me, x, y, z, own, mode, wanted, table, shape, start, end, worst, best, ranks, places, k):
     """Search a strip outward from cell `own`, LANES places at a time, until the cells are too far."""
     n_bits, cell_bits, cell = shape
@@ -211,7 +211,7 @@ def nearest_in_strip(me, x, y, z, own, mode, wanted, table, shape, start, end, w
     return worst
 
 
-@device
+@lean_device
 def nearest_places(w, me, x, y, z, mode, wanted, table, best, ranks, places, k):
     """Write the k nearest places of world w by (squared distance, rank) to `best`, `ranks`, `places`; -1 if there are fewer."""
     world_start, keys, strip_start, world_strip, inverse_cell = (

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 
-from tussle.numeric.kernel import device, kernel
+from tussle.numeric.kernel import kernel, lean_device
 
 SHORT = 1.0 - 1e-9
 """Ways that are at least this share of the whole outside of a volume only touch its surface."""
@@ -16,7 +16,7 @@ MARGIN = 1e-3
 """A sphere that is farther than a way is long by this share of its distance is not reached: rounding errors are far smaller."""
 
 
-@device
+@lean_device
 def is_within(faces, x, y, z):
     """Whether a point lies inside all faces, (4, faces): components of the normals, and offsets."""
     for f in range(faces.shape[1]):
@@ -25,7 +25,7 @@ def is_within(faces, x, y, z):
     return True
 
 
-@device
+@lean_device
 def first_hit(faces, x, y, z, ux, uy, uz):
     """Distance along a ray to the first point of the surface, or inf: Kay and Kajiya, Ray tracing complex scenes, SIGGRAPH 1986."""
     enter, leave, missed = -math.inf, math.inf, False
@@ -44,7 +44,7 @@ def first_hit(faces, x, y, z, ux, uy, uz):
     return first if not missed and enter <= leave and first >= 0.0 else math.inf
 
 
-@device
+@lean_device
 def are_beyond(faces, a, b, i):
     """Whether both ends of a way lie beyond one face, so that the way is outside."""
     for f in range(faces.shape[1]):
@@ -64,11 +64,12 @@ def contained(faces, pos, out):
 
 @kernel("F2 F2 F2 Bw")
 def crossed(faces, a, b, out):
-    """Write whether straight ways from a to b, (3, n) each, have a point inside all faces, (4, faces), to out, (n,)."""
+    """Leave true in out, (n,), where straight ways from a to b, (3, n) each, have a point inside all faces, (4, faces)."""
     for i in range(out.shape[0]):
+        if not out[i]:
+            continue
         ax, ay, az, bx, by, bz = a[0, i], a[1, i], a[2, i], b[0, i], b[1, i], b[2, i]
         if is_within(faces, ax, ay, az) or is_within(faces, bx, by, bz):
-            out[i] = True
             continue
         out[i] = False
         if (ax == bx and ay == by and az == bz) or are_beyond(faces, a, b, i):
@@ -81,7 +82,7 @@ def crossed(faces, a, b, out):
         out[i] = outside < SHORT * length
 
 
-@device
+@lean_device
 def sphere_hit(center, radius, x, y, z, ux, uy, uz):
     """Distance along a ray to the first point of a sphere, or inf; by the ray's closest point, since the discriminant would cancel."""
     x, y, z = center[0] - x, center[1] - y, center[2] - z
@@ -95,7 +96,7 @@ def sphere_hit(center, radius, x, y, z, ux, uy, uz):
     return first if is_moving and inward >= 0.0 and first >= 0.0 else math.inf
 
 
-@device
+@lean_device
 def distance_to(center, x, y, z):
     """Distance of a point from the centre of a sphere."""
     x, y, z = x - center[0], y - center[1], z - center[2]
@@ -111,12 +112,13 @@ def sphere_contained(center, radius, pos, out):
 
 @kernel("(f8 f8 f8) f8 F2 F2 Bw")
 def sphere_crossed(center, radius, a, b, out):
-    """Write whether straight ways from a to b, (3, n) each, have a point inside a sphere to out, (n,)."""
+    """Leave true in out, (n,), where straight ways from a to b, (3, n) each, have a point inside a sphere."""
     for i in range(out.shape[0]):
+        if not out[i]:
+            continue
         ax, ay, az, bx, by, bz = a[0, i], a[1, i], a[2, i], b[0, i], b[1, i], b[2, i]
         far = distance_to(center, ax, ay, az)
         if far < radius or distance_to(center, bx, by, bz) < radius:
-            out[i] = True
             continue
         out[i] = False
         if ax == bx and ay == by and az == bz:

@@ -9,13 +9,14 @@ except ImportError:
     raise MissingExtraError("tussle.rl needs Gymnasium and PettingZoo: pip install 'tussle[rl]'") from None
 
 from tussle.rl.action import Act
+from tussle.rl.computed import Computed
 from tussle.rl.draws import choice, uniform
 from tussle.rl.environments import TaskEnv, TaskVectorEnv, make, make_vec, register
 from tussle.rl.games import Consensus, NearOrigin, PredatorPrey, PredatorsAndPrey, PredatorTeam, PreyEscape
-from tussle.rl.observation import Component, Computed, Each, Means, NearestOthers, Own, Sectors
+from tussle.rl.observation import Component, Each, Means, NearestOthers, Own, Sectors
 from tussle.rl.parallel import TaskParallelEnv, parallel_env
 from tussle.rl.policy_file import write_policy
-from tussle.rl.reward import Nearest, Situation, Term, alive, captured, captures, collisions, died
+from tussle.rl.reward import FoundOthers, Situation, Term, alive, captured, captures, collisions, died
 from tussle.rl.robots import Coverage, FindWay, Formation, Hover, ReachPoint
 from tussle.rl.swarm import Swarm, evaluate, make_swarm, record_episode
 from tussle.rl.task import Task
@@ -34,11 +35,11 @@ __all__ = [
     "Each",
     "FindWay",
     "Formation",
+    "FoundOthers",
     "Hover",
     "Intercept",
     "Means",
     "NearOrigin",
-    "Nearest",
     "NearestOthers",
     "Own",
     "PredatorPrey",

@@ -35,8 +35,11 @@ def world_spaces(task: Task) -> tuple[spaces.Box, spaces.Space[Any]]:
     action = max((task.action_space(a) for a in agents), key=spaces.flatdim)
     if n == 1:
         return observation, action
-    box = spaces.Box(-np.inf, np.inf, (n, *observation.shape), task.dtype)
-    return box, batch_space(action, n)
+    low, high = np.zeros((2, n, *observation.shape), task.dtype)
+    for a in agents:
+        space = task.observation_space(a)
+        low[a, : space.shape[0]], high[a, : space.shape[0]] = space.low, space.high
+    return spaces.Box(low, high, dtype=task.dtype), batch_space(action, n)
 
 
 def check_options(options: Any, known: tuple[str, ...] = OPTIONS) -> dict[str, Any]:
@@ -65,12 +68,26 @@ def reset_one(swarm: Swarm, seed: Any, options: Any) -> None:
 def told_of_one(swarm: Swarm) -> dict[str, Any]:
     """Parameters that were given or drawn for the episode of a swarm of one world, as an info; empty without any."""
     values = {path: value[0] for path, value in swarm.params.items() if not path.startswith("_")}
-    return {"params": {path: value.item() if value.ndim == 0 else value.copy() for path, value in values.items()}} if values else {}
+    return (
+        {
+            "params": {
+                path: value.item() if value.ndim == 0 else value.copy() for path, value in values.items()
+            }
+        }
+        if values
+        else {}
+    )
 
 
-def _of_worlds(alive: np.ndarray, seeds: np.ndarray, params: dict[str, Any], worlds: np.ndarray) -> dict[str, Any]:
+def _of_worlds(
+    alive: np.ndarray, seeds: np.ndarray, params: dict[str, Any], worlds: np.ndarray
+) -> dict[str, Any]:
     """Infos of some worlds, (W,); those of the others are zeros."""
-    info: dict[str, Any] = {"alive": alive & worlds[:, None], "seed": np.where(worlds, seeds, 0), "params": {}}
+    info: dict[str, Any] = {
+        "alive": alive & worlds[:, None],
+        "seed": np.where(worlds, seeds, 0),
+        "params": {},
+    }
     for path, values in params.items():
         if not path.startswith("_"):
             have = params[f"_{path}"] & worlds
@@ -259,7 +276,11 @@ class TaskEnv(gymnasium.Env[Any, Any]):
         return self._seen(self.swarm.obs), self._info()
 
     def _info(self) -> dict[str, Any]:
-        return {"alive": self.swarm.alive[0].copy(), "seed": int(self.swarm.seeds[0]), **told_of_one(self.swarm)}
+        return {
+            "alive": self.swarm.alive[0].copy(),
+            "seed": int(self.swarm.seeds[0]),
+            **told_of_one(self.swarm),
+        }
 
     def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         """Play one decision; the reward is the sum over agents."""

@@ -63,7 +63,9 @@ class Episodes:
             else:
                 self.given.pop(w, None)
 
-    def drawn(self, worlds: np.ndarray, overrides: Overrides) -> list[tuple[np.ndarray, dict[str, list[Any]]]]:
+    def drawn(
+        self, worlds: np.ndarray, overrides: Overrides
+    ) -> list[tuple[np.ndarray, dict[str, list[Any]]]]:
         """Draw the parameters of the next episodes of some worlds, and note the values.
 
         Returns:
@@ -73,7 +75,9 @@ class Episodes:
         found: dict[str, list[tuple[int, Any]]] = {}
         for w in worlds.tolist():
             mine = {**varied, **self.given.get(w, {})}
-            self.values[w] = {path: value for path, value in mine.items() if not isinstance(value, Range | Choice)}
+            self.values[w] = {
+                path: value for path, value in mine.items() if not isinstance(value, Range | Choice)
+            }
             for path, value in mine.items():
                 if path in varied or path not in self.values[w]:
                     found.setdefault(path, []).append((w, value))

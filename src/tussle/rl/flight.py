@@ -15,7 +15,8 @@ from tussle.api import GroupView
 from tussle.documents import read_bytes
 from tussle.errors import MissingExtraError, ParameterError, listed, nearest_name
 from tussle.rl.action import Actor, Decoder, learned
-from tussle.rl.observation import AgentRows, Computed
+from tussle.rl.computed import Computed
+from tussle.rl.observation import AgentRows
 from tussle.rl.policy_file import TASK_KEY
 from tussle.rl.swarm import task_of
 from tussle.rl.task import Task

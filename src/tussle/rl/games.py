@@ -10,7 +10,8 @@ import numpy as np
 from tussle.engine.simulation import Simulation
 from tussle.mission import Block, Mission
 from tussle.rl.action import Act
-from tussle.rl.observation import Computed, NearestOthers, Own
+from tussle.rl.computed import Computed
+from tussle.rl.observation import NearestOthers, Own
 from tussle.rl.reward import Situation, Term, alive, captured, captures, closing
 from tussle.rl.task import Task
 from tussle.stock import MotorSchemas, MoveToGoalMS, Predator, SingleIntegrator
@@ -100,7 +101,9 @@ class PredatorTeam(Task):
         """The mission, in which the predators of the learner only claim."""
         mission = super().given
         claims = Predator(max_speed=35.0, capture_range=5.0, pursue=False)
-        hunters = {name for name in self.learners.split() if name in ("keepers", "switchers") and self.acts(name)}
+        hunters = {
+            name for name in self.learners.split() if name in ("keepers", "switchers") and self.acts(name)
+        }
         return mission.replace(
             blocks=[b.replace(autonomy=claims) if b.name in hunters else b for b in mission.blocks]
         )
@@ -132,7 +135,8 @@ def robots(count: int, spread: float, **plugins: Any) -> Mission:
         plugins: Further plugins of the block.
     """
     block = Block(
-        name="robot", count=count, placement="uniform", half_width=(spread, 0.0, 0.0), scatter_first=True, motion=SingleIntegrator(), **plugins
+        name="robot", count=count, placement="uniform", half_width=(spread, 0.0, 0.0), scatter_first=True, motion=SingleIntegrator(),
+        **plugins,
     )  # fmt: skip
     return Mission(blocks=[block], end=100.0, dt=1.0, name="robots")
 

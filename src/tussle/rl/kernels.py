@@ -17,7 +17,7 @@ from tussle.neighbors.lane_count import LANES
 from tussle.neighbors.nearest_lanes import NONE, find_nearest
 from tussle.neighbors.search import TABLE, in_range, nearest_places, table_of
 from tussle.numeric import atan2
-from tussle.numeric.kernel import device, kernel
+from tussle.numeric.kernel import kernel, lean_device
 
 SCALAR, PLANE, SPACE, DISTANCE, SAME_TEAM, PRESENT, FORWARD, DIRECTION = range(8)
 """Kinds of features: a number, a vector of two or three numbers, and what is known of a neighbour; the direction of the nose; the
@@ -28,7 +28,7 @@ QUAT = 6
 """Row of the quaternion in the body table, behind position and velocity."""
 
 
-@device
+@lean_device
 def frame_of(floats, row, mode):
     """Rotation from the world to an entity's frame, its nine numbers by rows."""
     if mode == WORLD:
@@ -47,7 +47,7 @@ def frame_of(floats, row, mode):
     return east, north, 0.0, -north, east, 0.0, 0.0, 0.0, 1.0
 
 
-@device
+@lean_device
 def put_vector(kind, scale, x, y, z, turn, a, column, out):
     """Write a vector of the world in the frame `turn`: two numbers if kind is PLANE, else three."""
     a = np.uint64(a)  # unsigned: without the test whether an index counts from the end
@@ -57,7 +57,7 @@ def put_vector(kind, scale, x, y, z, turn, a, column, out):
         out[a, np.uint64(column + 2)] = scale * (turn[6] * x + turn[7] * y + turn[8] * z)
 
 
-@device
+@lean_device
 def put_others(floats, team, row, near, n, spec, turn, a, column, width, out):
     """Write the features of near[:n], rows of the body table, for the entity `row`, `width` numbers for each; zeros for row -1."""
     kinds, source, numbers = spec
@@ -144,7 +144,7 @@ def nearest(floats, who, wanted, blocks, index, spec, numbers, radius, part, out
         if n_agents == 0:
             continue
         w = strip_world[block_strip[b]]
-        find_nearest(begin, (span_first[b], span_last[b]), w, candidates, table, mode, teams, radius, kept)
+        find_nearest(begin, (span_first[b], span_last[b]), w, candidates, table, mode, teams, radius, k, kept)
         start = world_start[w]
         rank = (1 << rank_bits(world_start[w + 1] - start)) - 1
         whole = kept.view(np.int64)

@@ -192,7 +192,8 @@ class League:
         path = Path(file if equals else text)
         if not path.is_file():
             raise ParameterError(
-                f"player {text!r}{nearest_name(text, [RULES])}: there is no file {path}; it takes rules, an ONNX file, NAME=rules or NAME=FILE"
+                f"player {text!r}{nearest_name(text, [RULES])}: there is no file {path}; "
+                "it takes rules, an ONNX file, NAME=rules or NAME=FILE"
             )
         stem = path.resolve().parent.name if path.stem == "policy" else path.stem
         made_for = Policy(str(path)).task or self.name

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import groupby
@@ -34,6 +34,8 @@ OTHERS = {
     "present": kernels.PRESENT,
 }
 TEAMS = ("own", "other")
+LIMITS = {"forward": (-1.0, 1.0), "quat": (-1.0, 1.0), "radius": (0.0, np.inf), "mass": (0.0, np.inf)}
+"""Body columns whose ranges are known."""
 RELATIVE = {"offset": "pos", "relative_vel": "vel"}
 WHOLE_WORLD = 500
 """Up to this many entities, the nearest others are looked for among all of a world."""
@@ -86,6 +88,42 @@ class Component(ABC):
     @abstractmethod
     def write(self, simulation: Simulation, part: AgentRows, column: int, out: np.ndarray) -> None:
         """Write the numbers of a part's agents to out, (agents, numbers), from `column` on."""
+
+    def bounds(self, mission: Mission, block: str) -> np.ndarray:
+        """Smallest and largest value of each number, (2, width), infinite where they are not known; 0 is always between them.
+
+        They follow from the declaration alone, so that they hold for all parameters. Values are not clipped.
+        """
+        return np.repeat([[-np.inf], [np.inf]], self.width(mission, block), axis=1)
+
+
+ROUNDING = 1.0 + 1e-6
+"""Bounds are wider by this factor, since turned vectors of single precision may be longer by a rounding error."""
+
+
+def _span(low: float, high: float, factor: float, n: int) -> list[tuple[float, float]]:
+    """Bounds of n numbers that are multiplied by a factor."""
+    ends = low * factor * ROUNDING, high * factor * ROUNDING
+    return [(min(ends), max(ends))] * n
+
+
+def _spans_of_others(
+    names: Sequence[str], scale: Scale, planar: bool, reach: float
+) -> list[tuple[float, float]]:
+    """Bounds of the features of others within `reach` [m]."""
+    known = {
+        "offset": (-reach, reach), "distance": (0.0, reach), "direction": (-1.0, 1.0), "same_team": (0.0, 1.0),
+        "present": (0.0, 1.0), **LIMITS,
+    }  # fmt: skip
+    found = []
+    for name in names:
+        _, width = _of_others([name], scale, planar)
+        found += _span(*known.get(name, (-np.inf, np.inf)), _factor(scale, name), width)
+    return found
+
+
+def _bounds(spans: Sequence[tuple[float, float]]) -> np.ndarray:
+    return np.array(spans, float).reshape(-1, 2).T
 
 
 def _check(where: str, frame: str, names: Sequence[str], allowed: Sequence[str], scale: Scale) -> None:
@@ -166,6 +204,14 @@ class Own(Component):
                 k = 3 if name == "forward" else FLOATS[name]
                 total += 2 if k == 3 and self.planar and name != "forward" else k
         return total
+
+    def bounds(self, mission: Mission, block: str) -> np.ndarray:
+        owner = next(b for b in mission.blocks if b.name == block)
+        spans: list[tuple[float, float]] = []
+        for name in self.columns.split():
+            width = _column_of(owner, name) if "." in name else self._lines(name)[1]
+            spans += _span(*LIMITS.get(name, (-np.inf, np.inf)), _factor(self.scale, name), width)
+        return _bounds(spans)
 
     @cached_property
     def _parts(self) -> list[tuple[str, Spec, int]]:
@@ -319,9 +365,7 @@ class _Search(_Others):
         if isinstance(of, int) and of not in (teams := sorted({b.team for b in mission.blocks})):
             raise ParameterError(f"{name}: of = {of}: there is no such team; {listed(map(str, teams))}")
         if not radius > 0.0 or (needs_radius and radius == np.inf):
-            raise ParameterError(
-                f"{name}: radius = {radius!r} is not allowed; it takes a number > 0"
-            )
+            raise ParameterError(f"{name}: radius = {radius!r} is not allowed; it takes a number > 0")
 
     def _index(
         self, simulation: Simulation, reach: float
@@ -362,6 +406,9 @@ class NearestOthers(_Search):
                 f"NearestOthers: k = {self.k!r} is not allowed; it takes a whole number >= 1"
             )
         return self.k * self._features[1]
+
+    def bounds(self, mission: Mission, block: str) -> np.ndarray:
+        return _bounds(self.k * _spans_of_others(self.columns.split(), self.scale, self.planar, self.radius))
 
     def write(self, simulation: Simulation, part: AgentRows, column: int, out: np.ndarray) -> None:
         bodies = simulation.state.population.bodies
@@ -441,6 +488,9 @@ class Sectors(_Search):
             raise ParameterError(f"Sectors: n = {self.n!r} is not allowed; it takes a whole number >= 1")
         return self.n
 
+    def bounds(self, mission: Mission, block: str) -> np.ndarray:
+        return _bounds([(0.0, 1.0)] * self.n)
+
     def write(self, simulation: Simulation, part: AgentRows, column: int, out: np.ndarray) -> None:
         mode, wanted = self._wanted(part, simulation)
         floats, places, arrays = self._index(simulation, self.radius)
@@ -466,6 +516,10 @@ class Means(_Search):
         _check("Means", self.frame, names, (*RELATIVE, *OTHERS, *FLOATS), self.scale)
         self._check_of(mission, self.radius, True)
         return 1 + self._features[1]
+
+    def bounds(self, mission: Mission, block: str) -> np.ndarray:
+        count = (0.0, np.inf) if self.count_scale > 0 else (-np.inf, 0.0)
+        return _bounds([count, *_spans_of_others(self.columns.split(), self.scale, self.planar, self.radius)])
 
     def write(self, simulation: Simulation, part: AgentRows, column: int, out: np.ndarray) -> None:
         spec, width = self._features
@@ -503,6 +557,10 @@ class Each(_Others):
         n_others = sum(blocks[name] for name in self.of.split()) - (block in self.of.split())
         return n_others * self._features[1]
 
+    def bounds(self, mission: Mission, block: str) -> np.ndarray:
+        spans = _spans_of_others(self.columns.split(), self.scale, self.planar, np.inf)
+        return _bounds(self.width(mission, block) // max(len(spans), 1) * spans)
+
     def write(self, simulation: Simulation, part: AgentRows, column: int, out: np.ndarray) -> None:
         spec, width = self._features
         bodies = simulation.state.population.bodies
@@ -527,19 +585,4 @@ class Each(_Others):
         return np.concatenate(parts, axis=1)
 
 
-@dataclass(frozen=True)
-class Computed(Component):
-    """Numbers from a function of the simulation: function(simulation) -> (worlds, agents, n), for the agents of all worlds."""
-
-    n: int
-    function: Callable[[Any], np.ndarray]
-
-    def width(self, mission: Mission, block: str) -> int:
-        return self.n
-
-    def write(self, simulation: Simulation, part: AgentRows, column: int, out: np.ndarray) -> None:
-        values = np.asarray(self.function(simulation)).reshape(-1, self.n)
-        out[part.agents, column : column + self.n] = values[part.agents]
-
-
-__all__ = ["AgentRows", "Component", "Computed", "Each", "Means", "NearestOthers", "Own", "Sectors"]
+__all__ = ["AgentRows", "Component", "Each", "Means", "NearestOthers", "Own", "Sectors"]

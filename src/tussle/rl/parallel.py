@@ -92,8 +92,9 @@ class TaskParallelEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]  # Pett
         self.agents = [] if swarm.over[0] else self._living()
         reported, numbers = before, self._at
         if self.agents != before:
-            reported = before + [name for name in self.agents if name not in set(before)]
-            self.agents = [name for name in self.agents if not dead[self._number[name]]]
+            known, is_dead = set(before), dead.tolist()
+            reported = before + [name for name in self.agents if name not in known]
+            self.agents = [name for name in self.agents if not is_dead[self._number[name]]]
             numbers, self._at = self._numbers(reported), self._numbers(self.agents)
             self._actions[~swarm.alive[0]] = 0  # of the dead, which `Situation.actions` would still show
         rewards, deaths, ends = (

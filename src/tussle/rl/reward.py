@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tussle.api.bodies import FLOATS
+from tussle.api.bodies import DERIVED, FLOATS
 from tussle.errors import ParameterError, listed, nearest_name
 from tussle.record.events import CAPTURE, COLLISION, DEATH, FLAG
 from tussle.rl.observation import AgentRows, Component, Means, NearestOthers
@@ -25,7 +25,7 @@ NOBODY = -1
 
 
 @dataclass(frozen=True)
-class Nearest:
+class FoundOthers:
     """The nearest other of each agent; of agents without one, and of the dead, `distance` is inf and the vectors are 0.
 
     Attributes:
@@ -64,7 +64,7 @@ class Situation:
         self.rows = self.agents = np.zeros(0, np.int64)
         self._events: list[Any] = []
         self._begun = np.zeros(len(alive), bool)  # worlds whose events belong to an earlier episode
-        self.parts: list[AgentRows] = []
+        self._parts: list[AgentRows] = []
         self._columns: dict[Any, Any] = {}  # of this state
         self._checked: dict[Component, int] = {}
 
@@ -74,16 +74,24 @@ class Situation:
 
     def __getattr__(self, name: str) -> np.ndarray:
         """A body column of the agents, (W, A) or (W, A, k); 0 for the dead."""
-        if name not in FLOATS:
-            raise AttributeError(f"a situation has no {name!r}{nearest_name(name, FLOATS)}; {listed(FLOATS)}")
+        if name not in FLOATS and name not in DERIVED:
+            known = [
+                *FLOATS,
+                *DERIVED,
+                *(k for k in (*vars(self), *vars(type(self))) if not k.startswith("_")),
+            ]
+            raise AttributeError(f"a situation has no {name!r}{nearest_name(name, known)}; {listed(known)}")
         if name not in self._columns:
-            source = getattr(self.simulation.state.population.bodies, name)
+            bodies = self.simulation.state.population.bodies
+            source = bodies.derived(name) if name in DERIVED else getattr(bodies, name)
             out = np.zeros((self.alive.size, *source.shape[:-1]))
             out[self.agents] = source[..., self.rows].T
             self._columns[name] = out.reshape(*self.alive.shape, *source.shape[:-1])
-        return self._columns[name]
+        return self._columns[name]  # type: ignore[no-any-return]
 
-    def nearest(self, of: str | int | None = None, radius: float = np.inf, k: int | None = None) -> Nearest:
+    def nearest(
+        self, of: str | int | None = None, radius: float = np.inf, k: int | None = None
+    ) -> FoundOthers:
         """Return the nearest other of each agent, by a search that does not visit all pairs.
 
         Args:
@@ -96,11 +104,13 @@ class Situation:
         """
         key = "nearest", of, radius, k
         if key not in self._columns:
-            many = NearestOthers(k or 1, "offset relative_vel distance present", of, radius, frame="world")
+            many = NearestOthers(
+                1 if k is None else k, "offset relative_vel distance present", of, radius, frame="world"
+            )
             values = self._observed(many).reshape(*self.alive.shape, *([] if k is None else [k]), 8)
             found = values[..., 7] > 0.0
             distance = np.where(found, values[..., 6], np.inf)
-            self._columns[key] = Nearest(found, distance, values[..., :3], values[..., 3:6])
+            self._columns[key] = FoundOthers(found, distance, values[..., :3], values[..., 3:6])
         return self._columns[key]  # type: ignore[no-any-return]
 
     def n_within(self, radius: float, of: str | int | None = None) -> np.ndarray:
@@ -120,9 +130,16 @@ class Situation:
             mission = self.simulation.mission
             self._checked[component] = max(component.width(mission, b.name) for b in mission.blocks)
         out = np.zeros((self.alive.size, self._checked[component]))
-        for part in self.parts:
+        for part in self._parts:
             component.write(self.simulation, part, 0, out)
         return out
+
+    def look(self, parts: list[AgentRows]) -> None:
+        """Take the agents that are there, after entities were born or removed."""
+        none = [np.zeros(0, np.int64)]
+        self._parts = parts
+        self.rows = np.concatenate([*none, *(p.rows for p in parts)])
+        self.agents = np.concatenate([*none, *(p.agents for p in parts)])
 
     def forget(self) -> None:
         """Discard what has been computed from the last states."""
@@ -206,7 +223,7 @@ class Term:
     """One term of the reward.
 
     Attributes:
-        function: Function of a `Situation`: values that broadcast to (W, A).
+        function: Function of a `Situation`: values for each agent, (W, A), for each world, (W, 1), or one for all.
         weight: Factor.
         per: Who receives it: "agent", or the sum over the agents of the "team" or "world".
     """
@@ -222,9 +239,26 @@ class Term:
             raise ParameterError(f"Term: weight = {self.weight!r} is not allowed; it takes a finite number")
 
     def write(self, now: Situation, out: np.ndarray) -> None:
-        """Write the weighted values to out, (W, A); 0 for agents that were dead before."""
-        np.multiply(self.function(now), self.weight, out=out, casting="same_kind")
-        out *= now.was_alive
+        """Write the weighted values to out, (W, A); 0 for agents that were dead before.
+
+        Raises:
+            ParameterError: The values have another shape, or that of an agent is not a finite number.
+        """
+        values = np.asarray(self.function(now))
+        worlds, agents = out.shape
+        if values.shape not in ((), (worlds, agents), (worlds, 1), (1, agents)):
+            raise ParameterError(
+                f"returns shape {values.shape}; it returns ({worlds}, {agents}), a value for each world and agent, or ({worlds}, 1), one "
+                "for each world, such as values[:, None]"
+            )
+        np.multiply(values, self.weight, out=out, casting="same_kind")
+        out[~now.was_alive] = 0.0
+        if not np.isfinite(out).all():
+            world, agent = np.argwhere(~np.isfinite(out))[0].tolist()
+            raise ParameterError(
+                f"is {out[world, agent]} for agent {agent} in world {world}; it returns finite numbers "
+                "(`simulation.read` has NaN for the dead)"
+            )
         if self.per == "world":
             out[:] = out.sum(axis=1, keepdims=True)
         elif self.per == "team":
@@ -235,4 +269,14 @@ class Term:
             out *= now.was_alive
 
 
-__all__ = ["Nearest", "Situation", "Term", "alive", "captured", "captures", "closing", "collisions", "died"]
+__all__ = [
+    "FoundOthers",
+    "Situation",
+    "Term",
+    "alive",
+    "captured",
+    "captures",
+    "closing",
+    "collisions",
+    "died",
+]

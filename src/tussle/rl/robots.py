@@ -158,7 +158,7 @@ def headings(now: Situation) -> np.ndarray:
 
 def spacing(now: Situation) -> np.ndarray:
     """1 where the nearest other is neither too near nor too far, (W, A)."""
-    distance = now.nearest("robot_0 robot_1 robot_2 robot_3").distance
+    distance = now.nearest().distance
     return np.asarray((distance > SPACING[0]) & (distance < SPACING[1]))
 
 

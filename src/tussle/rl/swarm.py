@@ -14,7 +14,7 @@ from tussle.batch.variables import Choice, Range
 from tussle.engine.simulation import Simulation
 from tussle.errors import ParameterError, SnapshotError, WiringError, listed
 from tussle.rl.episodes import Episodes, checked_params, checked_seeds, checked_value, checked_worlds
-from tussle.rl.observation import AgentRows
+from tussle.rl.observation import AgentRows, Each
 from tussle.rl.reward import COUNTED, NOBODY, Situation
 from tussle.rl.task import Task
 
@@ -101,6 +101,11 @@ class Swarm:
         self.action_width = max(len(d.free) for d in task.decoders)
         self._ints: np.ndarray | None = None
         self._parts: list[AgentRows] = []
+        self._watching: list[AgentRows] = []
+        seen = [task.components(b.name) for b in task.blocks]
+        self._is_alike = all(each == seen[0] for each in seen) and not any(
+            isinstance(c, Each) for c in seen[0]
+        )
         self._check_ends = True
         self._told: dict[str, Any] | None = None
 
@@ -208,11 +213,27 @@ class Swarm:
                 alive[agents], ids[agents] = True, bodies.id[rows]
                 team, span = bodies.team[rows].astype(float), (int(rows[0]), int(rows[-1]) + 1)
                 self._parts.append(AgentRows(name, group, rows, agents, team, kept, span))
-        none = [np.zeros(0, np.int64)]
-        self.now.parts = self._parts
-        self.now.rows = np.concatenate([*none, *(p.rows for p in self._parts)])
-        self.now.agents = np.concatenate([*none, *(p.agents for p in self._parts)])
+        joined = self._joined(self._parts)
+        self._watching = joined if self._is_alike else self._parts
+        self.now.look(joined)
         self._check_ends = True
+
+    def _joined(self, parts: list[AgentRows]) -> list[AgentRows]:
+        """The parts of each group as one, so that a search has all agents of a world at once."""
+        found = []
+        for group in dict.fromkeys(part.group for part in parts):
+            mine = [part for part in parts if part.group is group]
+            if len(mine) > 1:
+                rows = np.concatenate([p.rows for p in mine])
+                order = np.argsort(rows)
+                rows, agents, team = (
+                    rows[order],
+                    *(np.concatenate([getattr(p, name) for p in mine])[order] for name in ("agents", "team")),
+                )
+                span = int(rows[0]), int(rows[-1]) + 1
+                mine = [replace(mine[0], rows=rows, agents=agents, team=team, span=span)]
+            found += mine
+        return found
 
     def _observe(self, worlds: np.ndarray | None = None) -> None:
         """Compute the observations of all worlds, or of some."""
@@ -222,7 +243,7 @@ class Swarm:
                 self.obs[~self.alive] = 0.0
         else:
             self.obs[worlds] = 0.0
-        for part in self._parts:
+        for part in self._watching:
             some = part
             if worlds is not None and len(worlds) < self.n_worlds:
                 mask = np.zeros(self.n_worlds, bool)
@@ -328,7 +349,10 @@ class Swarm:
     def _reward(self) -> None:
         self.rewards[:] = 0.0
         for name, term in self.task.reward.items():
-            term.write(self.now, self.terms[name])
+            try:
+                term.write(self.now, self.terms[name])
+            except ParameterError as error:
+                raise ParameterError(f"{type(self.task).__name__}: reward {name!r} {error}") from None
             self.rewards += self.terms[name]
         if self.autoreset != "disabled" and self.over.any():  # these belong to the last episode
             self.returns[self.over], self.lengths[self.over] = 0.0, 0
@@ -343,9 +367,10 @@ class Swarm:
         if self._check_ends:
             over |= self._are_decided()
         ends = np.asarray(task.ends(now))
-        if ends.shape not in ((), over.shape):
+        if ends.shape not in ((), over.shape) or ends.dtype != bool:
             raise ParameterError(
-                f"{type(task).__name__}.ends returns shape {ends.shape}; it returns {over.shape}, one per world"
+                f"{type(task).__name__}.ends returns {ends.dtype} of shape {ends.shape}; "
+                f"it returns truth values, {over.shape}, one per world"
             )
         over |= ends
         self.terminations |= over[:, None] & self.alive

@@ -128,11 +128,17 @@ class Task:
         if self.scripted is None or self._age("scripted") > self._age("mission"):
             return self.replace(action=())
         values = {"mission": self.scripted, "action": ()}
-        return self.replace(**values if isinstance(self.scripted, (str, Path)) else {**values, "overrides": {}})
+        return self.replace(
+            **values if isinstance(self.scripted, (str, Path)) else {**values, "overrides": {}}
+        )
 
     def _age(self, name: str) -> int:
         """How far back an attribute was set: -1 as an argument, else by the class at this place in the order of classes."""
-        return -1 if name in self._given else next(i for i, c in enumerate(type(self).__mro__) if name in vars(c))
+        return (
+            -1
+            if name in self._given
+            else next(i for i, c in enumerate(type(self).__mro__) if name in vars(c))
+        )
 
     @cached_property
     def blocks(self) -> list[Block]:
@@ -213,9 +219,19 @@ class Task:
         return np.repeat(np.arange(len(self.blocks)), self.capacities)
 
     def observation_space(self, agent: int) -> spaces.Box:
-        """Observations of an agent."""
-        width = sum(self.widths[self.blocks[self.agent_block[agent]].name])
-        return spaces.Box(-np.inf, np.inf, (width,), self.dtype)
+        """Observations of an agent; bounds are infinite where they do not follow from the components."""
+        low, high = self._bounds[self.blocks[self.agent_block[agent]].name]
+        return spaces.Box(low, high, dtype=self.dtype)
+
+    @cached_property
+    def _bounds(self) -> dict[str, np.ndarray]:
+        """Bounds of the observations of each block, (2, numbers)."""
+        return {
+            b.name: np.concatenate(
+                [c.bounds(self.played, b.name) for c in self.components(b.name)], axis=1
+            ).astype(self.dtype)
+            for b in self.blocks
+        }
 
     def action_space(self, agent: int) -> spaces.Space[Any]:
         """Actions of an agent; a space of its own, as each has a random generator."""

@@ -176,7 +176,7 @@ def armies(count: int) -> Mission:
 
 def balance(now: Situation) -> np.ndarray:
     """Share of the red army that is alive less that of the blue one, (W, 1)."""
-    red, blue = (now.simulation.read(f"{name}.pos")[1].mean(axis=1) for name in ("red", "blue"))
+    red, blue = (now.simulation.read(f"{name}.team")[1].mean(axis=1) for name in ("red", "blue"))
     return np.asarray(red - blue)[:, None]
 
 

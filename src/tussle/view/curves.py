@@ -53,7 +53,7 @@ class GameCurves:
 
     def forget_after(self, step: int) -> None:
         """Forget all steps after one."""
-        self.series = {quantity: series.until(step) for quantity, series in self.series.items()}
+        self.series = {name: each.until(step) for name, each in self.series.items() if each.first <= step}
         self._last, self._who = min(self._last, step), None
 
     def rest(self, seconds: float) -> None:
@@ -97,6 +97,9 @@ class GameCurves:
         if series is None or step < series.first:
             series = StepSeries()
         elif step <= series.last:
+            return
+        elif series.values[-1] == value and not self._is_after_gap:  # mostly, and then at little cost
+            series.last = step
             return
         self.series[quantity] = series = series.add(step, value, is_after_gap=self._is_after_gap)
         if series.is_thinned:
@@ -154,14 +157,9 @@ def numbers_of(state: EntityState) -> dict[str, tuple[float, str]]:
         found |= _numbers(names if np.ndim(reading.value) else [column], reading)
     for plugin, columns in state.plugins.items():
         for column, reading in columns.items():
-            fields = [f"{plugin}.{name}" for name in field_names(column, reading.fields)]
+            fields = [f"{plugin}.{column}.{field}" for field in reading.fields]
             found |= _numbers(fields if np.ndim(reading.value) else [f"{plugin}.{column}"], reading)
     return found
-
-
-def field_names(column: str, fields: Iterable[str]) -> list[str]:
-    """Return the names of a column's fields: "goal.x", but "velocity_x" where the field has the column's name in it."""
-    return [field if field.startswith(column) else f"{column}.{field}" for field in fields]
 
 
 def _numbers(names: Iterable[str], reading: Reading) -> dict[str, tuple[float, str]]:

@@ -337,9 +337,12 @@ class Recording:
         place = int(np.searchsorted(ids, who))
         return first + place if place < len(ids) and ids[place] == who else -1
 
-    def value(self, row: int, name: str) -> float:
-        """A column of the table in a row."""
-        return float(self._column(row, row + 1, name)[0])
+    def values_at(self, rows: np.ndarray, name: str) -> np.ndarray:
+        """A column of numbers of the table in some rows, (n,); NaN in those below 0 and where it is null."""
+        values = np.full(len(rows), np.nan)
+        column = self.run.trajectory_table[name].take(pa.array(rows[rows >= 0]))
+        values[rows >= 0] = column.cast(pa.float64()).to_numpy()
+        return values
 
     def at(self, t: float) -> Frame:
         """The last frame that is not after a time [s]; the first for times before it.

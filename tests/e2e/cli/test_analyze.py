@@ -145,5 +145,5 @@ def test_a_played_batch_is_analysed(tussle):
     tussle("batch", "game.xml", "--runs", "3", "--vary", "n=10,5", "--out", "played")
     found = json.loads(tussle("analyze", "played", "--json").stdout)
     assert (found["n_runs"], found["n_points"], found["n_failed"]) == (6, 2, 0)
-    assert [c["b"] for c in found["comparisons"]] in (["n=5"], [])
+    assert {c["b"] for c in found["comparisons"]} <= {"n=5"}
     assert "hunters" in tussle("analyze", "played").stdout

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 import shutil
 import signal
@@ -13,6 +14,7 @@ import pytest
 from cli_process import call
 from test_terminal import ESCAPE, seen
 
+from tussle import load_run
 from tussle.batch import InProcess, load_batch
 
 PLUGINS = ("--plugin-path", "plugins.py")
@@ -143,6 +145,65 @@ def test_runs_are_recorded_in_full_on_demand(here, folder):
     assert here(*command, "--record-runs", "0,4")[0] == 0
     assert first.stat().st_mtime_ns == before
     assert (folder / "out" / "runs" / "000004" / "trajectory.arrow").exists()
+
+
+COUNTING = '''\
+from tussle.api import Autonomy, State
+
+
+class Counting(Autonomy):
+    """Counts steps, by twice its id."""
+
+    count = State(doc="The count.")
+    seen = State(dtype=bool)
+
+    def step(self, g):
+        self.count += 2.0 * g.id
+        self.seen[:] = True
+'''
+COUNTED = """<runscript><run end="0.3" dt="0.1"/><entity><team_id>1</team_id><count>2</count><autonomy>Counting</autonomy></entity>
+<entity><team_id>2</team_id></entity></runscript>"""
+
+
+def test_columns_of_plugins_are_recorded_and_analysed(here, folder):
+    (folder / "counting.py").write_text(COUNTING)
+    (folder / "counted.xml").write_text(COUNTED)
+    command = (
+        "batch",
+        "counted.xml",
+        "--runs",
+        4,
+        "--out",
+        "out",
+        "--processes",
+        1,
+        "--plugin-path",
+        "counting.py",
+    )
+    code, _, err = here(*command, "--record-runs", "0:2", "--record-columns", "*.cuont")
+    assert code == 1
+    assert "columns = '*.cuont' is no State or Output of an entity's plugin" in err
+    assert not (folder / "out").exists()
+    assert here(*command, "--record-columns", "*.count")[0] == 2
+    assert here(*command, "--record-runs", "0:2")[0] == 0
+    assert load_run(folder / "out/runs/000001").columns == {}
+    assert here(*command, "--record-runs", "0:2", "--record-columns", "*.count,*.seen")[0] == 0
+    first = folder / "out/runs/000001/run.json"
+    before = first.stat().st_mtime_ns
+    assert list(load_run(first.parent).columns) == ["Counting.count", "Counting.seen"]
+    assert here(*command, "--record-runs", "0:2", "--record-columns", "*.count,*.seen")[0] == 0
+    assert here(*command, "--record-runs", "0:2")[0] == 0
+    assert first.stat().st_mtime_ns == before
+    results = load_batch(folder / "out")
+    assert results.quantity("Counting.count[1]").tolist()[:3] == pytest.approx([4.5] * 3)
+    assert math.isnan(results.quantity("Counting.count[1]")[3])
+    assert results.quantity("Counting.count / 2 + t").tolist()[0] == pytest.approx(2.55)
+    assert results.quantity("Counting.seen").tolist()[0] == 0.75
+    code, out, err = here("analyze", "out", "--quantity", "Counting.count[1]")
+    assert code == 0
+    assert re.search(r"Counting.count\[1\].* 4\.5 ", out)
+    assert "columns of plugins are known of 3 runs" in err
+    assert here("analyze", "out", "--quantity", "Counting.cuont")[0] == 1
 
 
 # -- one of its runs again ------------------------------------------------------------------------------------------------------

@@ -165,6 +165,19 @@ def test_shapes_are_recorded_where_they_are_asked_for(tussle, folder):
     assert [run.shapes_table.num_rows for run in runs] == [0, 30, 0]
 
 
+def test_columns_of_plugins_are_recorded_where_they_are_asked_for(tussle, folder):
+    plain = tussle("run", "game.xml", "--out", "plain")
+    told = tussle("run", "game.xml", "--out", "told", "--record-columns", "prey.Boids.target,*.Unicycle.*")
+    assert hash_of(plain) == hash_of(told)
+    runs = [load_run(folder / name) for name in ("plain", "told")]
+    assert [list(run.columns) for run in runs] == [[], ["Boids.target", "Unicycle.x"]]
+    assert all(run.is_complete for run in runs)
+    wrong = tussle("run", "game.xml", "--record-columns", "prey.Boids.tarrget", code=1)
+    assert "did you mean 'prey.Boids.target'?" in wrong.stderr
+    assert len(wrong.stderr.splitlines()) == 1
+    assert not (folder / "runs").exists()
+
+
 def test_pace_takes_its_time_and_changes_nothing(tussle, folder):
     fast = tussle("run", "game.xml", "--out", "fast", "--end", "2")
     slow = tussle("run", "game.xml", "--out", "slow", "--end", "2", "--pace", "2")
@@ -247,6 +260,7 @@ def test_a_plugin_that_fails_ends_the_game_and_what_was_played_is_kept(tussle, f
         (["run", "game.xml", "--pace", "0"], 2, "--pace 0 is not allowed"),
         (["run", "game.xml", "--log-period", "nan"], 2, "--log-period nan is not allowed"),
         (["run", "game.xml", "--no-log", "--out", "x"], 2, "--no-log"),
+        (["run", "game.xml", "--no-log", "--record-columns", "*"], 2, "--no-log"),
         (["run", "nothing.xml"], 1, "nothing.xml"),
         (["run", "predator_pray"], 1, "did you mean 'predator_prey'?"),
         (["run", "game.xml", "--set", "m=3"], 1, "the mission has no setting 'm'"),

@@ -18,7 +18,8 @@ if len(sys.argv) > 2:
     resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[2]), int(sys.argv[2])))
 sim = Simulation(hunt(end=1e6, end_conditions="time"), seeds=range(8))
 try:
-    with Recorder(sim, sys.argv[1], flush_every=0.1 if len(sys.argv) == 2 else 1e-3):
+    flush_every = 0.1 if len(sys.argv) == 2 else 1e-3
+    with Recorder(sim, sys.argv[1], flush_every=flush_every, columns="*.target"):
         print("begun", flush=True)
         while True:
             sim.step(20)

@@ -48,6 +48,11 @@ def test_a_killed_run_loads_and_is_at_most_one_flush_behind(tmp_path, case):
     assert any("run.json is missing" in note for note in run.notes)
     assert run.info == {}
     states = run.trajectory
+    # All columns of plugins, of those who have them.
+    assert list(run.columns) == ["Boids.target", "Predator.target"]
+    is_hunter = states["block"] == "hunters"
+    assert (states["Predator.target"].notna() == is_hunter).all()
+    assert (states["Boids.target.x"].isna() == is_hunter).all()
     # Whole steps without a gap: as many states of each step and world as there were entities.
     steps = states["step"].unique()
     assert list(steps) == list(range(len(steps)))

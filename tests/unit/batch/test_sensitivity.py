@@ -98,12 +98,12 @@ def test_a_choice_among_ranges_has_its_part_with_few_points_too(n):
 
 
 def test_few_points_have_no_parts_and_the_note_says_so():
-    points = sample(ISHIGAMI, "lhs", 11, seed=1)
+    points = sample(ISHIGAMI, "lhs", 6, seed=1)
     found = results_of(ishigami(points), variables=ISHIGAMI, points=points, sample="lhs").sensitivity(
         "score[2]"
     )
     assert all(e.first_order is None and e.method == "" for e in found)
-    assert "they take 12 points" in found[0].note
+    assert "they take 7 points" in found[0].note
 
 
 # -- factorial ------------------------------------------------------------------------------------------------------------

@@ -124,8 +124,9 @@ def test_a_few_games_leave_an_answer_open():
     assert answers.sentences()[0].startswith(
         "open: no value is sure to reach Guard.share >= 0.8 yet; the smallest that may is n = 8: "
     )
-    assert set(answers.wanted) <= {1, 2}
-    assert answers.wanted
+    assert set(answers.wanted()) <= {1, 2}
+    assert answers.wanted()
+    assert answers.wanted(30) == []
 
 
 def test_of_a_hypercube_neighbouring_values_are_taken_together():

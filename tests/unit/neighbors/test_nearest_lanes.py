@@ -10,20 +10,20 @@ from tussle.neighbors.search import ANY, DIFFERENT, SAME
 from tussle.numeric.kernel import kernel
 
 
-@kernel("(I2 I2 F2) (I I I I F2 F) (i8 f8) i8 F2w I2w")
+@kernel("(I2 I2 F2) (I I I I F2 F) (i8 f8 i8) i8 F2w I2w")
 def ranks_of(blocks, index, options, n_blocks, square, rank):
-    """Squared distance and rank of the nearest entities of team 1 of each place, (LANES, n); -1 for missing ones."""
+    """Squared distance and rank of the k nearest entities of team 1 of each place, (LANES, n); -1 for missing ones."""
     cuts, spans, points = blocks
     strip_world, order, world_start, keys, placed, team = index
-    mode, radius = options
+    mode, radius, k = options
     kept, wanted = np.empty((LANES, LANES)), np.ones(LANES)
     table = world_start, keys, (placed[0], placed[1], placed[2]), team
     for b in range(n_blocks):
         w = strip_world[cuts[2, b]]
         span, candidates = (cuts[3, b], cuts[4, b]), (cuts[0], spans[0], spans[1], points)
-        find_nearest(cuts[1, b], span, w, candidates, table, mode, wanted, radius, kept)
+        find_nearest(cuts[1, b], span, w, candidates, table, mode, wanted, radius, k, kept)
         for q in range(cuts[1, b], cuts[1, b + 1]):
-            for j in range(LANES):
+            for j in range(k):
                 key = kept[j, q - cuts[1, b]]
                 square[j, order[cuts[0, q]]] = key
                 bits = 0
@@ -33,8 +33,9 @@ def ranks_of(blocks, index, options, n_blocks, square, rank):
                 rank[j, order[cuts[0, q]]] = whole & ((1 << bits) - 1) if key < NONE else -1
 
 
+@pytest.mark.parametrize("k", range(1, LANES + 1))
 @pytest.mark.parametrize("is_grid", [False, True])
-def test_the_nearest_of_each_lane(is_grid):
+def test_the_nearest_of_each_lane(is_grid, k):
     chance, sizes = np.random.default_rng(5), (1, 5, 110, 300)
     n = sum(sizes)
     pos = chance.uniform(-40, 40, (3, n))
@@ -53,12 +54,12 @@ def test_the_nearest_of_each_lane(is_grid):
         for mode in (ANY, SAME, DIFFERENT):
             square, rank = np.zeros((LANES, n)), np.zeros((LANES, n), np.int64)
             arrays = blocks.cuts, blocks.spans, blocks.points
-            ranks_of(arrays, table, (mode, radius), blocks.n_blocks, square, rank)
+            ranks_of(arrays, table, (mode, radius, k), blocks.n_blocks, square, rank)
             counts = {ANY: team >= 0, SAME: team == 1, DIFFERENT: team != 1}[mode]
             for i in range(n):
                 squares = ((pos - pos[:, i : i + 1]) ** 2).sum(axis=0)
                 others = np.flatnonzero((world == world[i]) & counts & (squares < radius**2))
                 others = others[others != i]
-                first = others[np.lexsort((ids[others], squares[others]))][:LANES]
-                assert rank[:, i].tolist() == [*(ids[first] - 1), *[-1] * (LANES - len(first))]
+                first = others[np.lexsort((ids[others], squares[others]))][:k]
+                assert rank[:k, i].tolist() == [*(ids[first] - 1), *[-1] * (k - len(first))]
                 np.testing.assert_allclose(square[: len(first), i], squares[first], rtol=1e-12, atol=1e-300)

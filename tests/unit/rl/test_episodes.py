@@ -481,7 +481,9 @@ def test_each_episode_draws_from_its_distribution(task, where):
 
 def test_worlds_may_have_distributions_and_values(task):
     swarm = make_swarm(task, 4)
-    swarm.reset(seed=1, params={SPEED: [uniform(1.0, 2.0), 5.0, choice([7.0, 8.0]), uniform(10, 19, unit="kt")]})
+    swarm.reset(
+        seed=1, params={SPEED: [uniform(1.0, 2.0), 5.0, choice([7.0, 8.0]), uniform(10, 19, unit="kt")]}
+    )
     one, two, three, four = speeds(swarm)
     assert 1.0 < one < 2.0
     assert two == 5.0
@@ -535,7 +537,7 @@ def test_infos_tell_seed_and_parameters(view, task):
     assert drawn == {SPEED: speeds(env.swarm).tolist(), TURN: [np.pi / 2]}
     if view != "ParallelEnv":
         assert told(step()) == drawn
-    assert told(reset(3, {}))== {}
+    assert told(reset(3, {})) == {}
 
 
 def test_the_info_of_an_ended_episode_tells_its_seed_and_parameters():

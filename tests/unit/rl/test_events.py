@@ -395,3 +395,118 @@ def test_an_unborn_agent_has_no_events_of_an_earlier_episode(task):
             assert not swarm.now.count("death")[~was_there].any()
             assert (swarm.now.id[~was_there] == -1).all()
         assert was_there.sum() > 14
+
+
+# -- what is returned -----------------------------------------------------------------------------------------------------------
+
+
+def stepped(task, worlds=6):
+    swarm = make_swarm(task, worlds)
+    swarm.reset(seed=1)
+    return swarm.step(np.zeros((worlds, 6, 2), np.float32))
+
+
+@pytest.mark.parametrize("worlds", [1, 4, 6])
+def test_values_of_worlds_and_of_agents_are_told_apart(task, worlds):
+    """In a stack of as many worlds as agents, a value for each world would be taken for one of each agent."""
+    reward = {"east": Term(lambda now: now.pos[..., 0].max(axis=1))}
+    with pytest.raises(
+        ParameterError, match=rf"Flee: reward 'east' returns shape \({worlds},\); it returns \({worlds}, 6\)"
+    ):
+        stepped(task.replace(reward=reward), worlds)
+    for function in (
+        lambda now: now.pos[..., 0].max(axis=1)[:, None],
+        lambda now: 1.0 * now.alive,
+        lambda now: 2.0,
+        lambda now: now.team[None] == 1,
+    ):
+        stepped(task.replace(reward={"own": Term(function)}), worlds)
+
+
+def test_rewards_that_are_no_numbers_are_refused(task):
+    def apart(now):
+        pos = now.simulation.read("prey.pos")[0]
+        return np.linalg.norm(pos - pos.mean(axis=1, keepdims=True), axis=-1)
+
+    swarm = make_swarm(task.replace(reward={"apart": Term(apart)}), 2, autoreset="disabled")
+    swarm.reset(seed=1)
+
+    def play():
+        for _ in range(60):
+            swarm.step(np.full((2, 6, 2), -1, np.float32))
+
+    message = r"reward 'apart' is nan for agent \d in world \d; it returns finite numbers"
+    with pytest.raises(ParameterError, match=message):
+        play()
+    with pytest.raises(ParameterError, match="reward 'far' is inf for agent 0"):
+        stepped(task.replace(reward={"far": Term(lambda now: np.full((6, 6), np.inf))}))
+
+
+def test_values_of_the_dead_do_not_matter(task):
+    """A function may return anything for agents that are not there."""
+    own = {"own": Term(lambda now: np.where(now.was_alive, 1.0, np.nan), per="team")}
+    swarm = make_swarm(task.replace(reward=own), 2, autoreset="disabled")
+    swarm.reset(seed=1)
+    for _ in range(55):
+        before = swarm.alive.copy()
+        swarm.step(np.full((2, 6, 2), -1, np.float32))
+        np.testing.assert_array_equal(swarm.rewards, before.sum(axis=1, keepdims=True) * before)
+    assert not swarm.alive.all()
+
+
+@pytest.mark.parametrize(
+    "ends", [lambda now: now.count("death").sum(axis=1), lambda now: 1, lambda now: "no"]
+)
+def test_ends_are_truth_values(task, ends):
+    kind = type("Ending", (Flee,), {"ends": lambda self, now: ends(now)})
+    with pytest.raises(ParameterError, match=r"Ending.ends returns .* it returns truth values"):
+        stepped(kind())
+
+
+@pytest.mark.parametrize(
+    "function",
+    [
+        lambda simulation: simulation.read("prey.pos")[0][..., :1],  # of one block of two
+        lambda simulation: np.zeros((4, 8)),
+        lambda simulation: np.zeros((8, 4, 1)),
+        lambda simulation: 0.0,
+    ],
+)
+def test_an_observation_has_a_row_for_each_agent(function):
+    swarm = make_swarm(Crowd(observation=(Computed(1, function),)), 4)
+    with pytest.raises(
+        ParameterError, match=r"Computed: the function returns shape \(.*\); it returns \(4, 8, 1\)"
+    ):
+        swarm.reset(seed=1)
+
+
+def test_an_observation_is_a_number(task):
+    observation = (Computed(1, lambda simulation: 1.0 / simulation.read("prey.vel")[0][..., :1].clip(0, 0)),)
+    with (
+        pytest.raises(ParameterError, match=r"Computed: agent 0 in world 0 observes \[inf\]"),
+        np.errstate(all="ignore"),
+    ):
+        make_swarm(task.replace(observation=observation), 2).reset(seed=1)
+
+
+def test_a_misspelt_column_names_the_nearest(task):
+    for name, near in (
+        ("alve", "alive"),
+        ("poss", "pos"),
+        ("diedd", "died"),
+        ("neerest", "nearest"),
+        ("yaww", "yaw"),
+    ):
+        with pytest.raises(AttributeError, match=rf"a situation has no {name!r} \(did you mean {near!r}\?\)"):
+            stepped(task.replace(reward={"own": Term(lambda now, name=name: getattr(now, name))}))
+
+
+def test_derived_columns_are_those_of_the_simulation(task):
+    swarm = make_swarm(task, 3, autoreset="disabled")
+    swarm.reset(seed=1)
+    for _ in range(40):
+        swarm.step(np.ones((3, 6, 2), np.float32))
+        for name in ("yaw", "climb", "roll", "forward"):
+            values, there = swarm.simulation.read(f"prey.{name}")
+            values[~there] = 0.0
+            np.testing.assert_array_equal(getattr(swarm.now, name), values)

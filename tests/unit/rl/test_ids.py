@@ -7,20 +7,23 @@ from flee import Flee
 
 from tussle.errors import ParameterError
 from tussle.rl import (
-    Act,
+    Computed,
+    Each,
     FindWay,
+    Means,
+    NearestOthers,
     Own,
     PredatorTeam,
-    Task,
-    Term,
-    alive,
+    Sectors,
     evaluate,
     make_swarm,
     make_vec,
-    parallel_env,
 )
+from tussle.rl.environments import world_spaces
 from tussle.rl.flight import registered_tasks
 
+UNKNOWN = ("tussle/Hover-v0", "tussle/ReachPoint-v0", "tussle/RLSimple-v0", "tussle/RLConsensus-v0")
+"""Tasks that observe only what has no bounds."""
 IDS = sorted(name for name in registered_tasks() if name.startswith("tussle/"))
 
 
@@ -63,14 +66,18 @@ def test_who_plays_by_rule_is_of_the_mission_that_was_given_last():
     again = Scripted(mission=Flee.mission.replace(end=2.0))
     assert evaluate(again, n_episodes=2)["alive"].max() < 6 * 21 * 0.1
     for task in (Claimed(), Scripted(mission=Claimed.mission), FindWay(mission=FindWay.mission)):
-        with pytest.raises(ParameterError, match=rf"no autonomies play '{task.learners}' by rule.*give scripted ="):
+        with pytest.raises(
+            ParameterError, match=rf"no autonomies play '{task.learners}' by rule.*give scripted ="
+        ):
             evaluate(task, n_episodes=2)
     team = PredatorTeam(mission="predator_prey", time_limit=1.0)
     assert evaluate(team, n_episodes=1)["closing"][0] != 0.0
 
 
 def test_overrides_are_not_ignored():
-    with pytest.raises(ParameterError, match=r"overrides = \{'prey.count': 3\} is not allowed with a mission made in Python"):
+    with pytest.raises(
+        ParameterError, match=r"overrides = \{'prey.count': 3\} is not allowed with a mission made in Python"
+    ):
         make_swarm(Flee(overrides={"prey.count": 3}))
     swarm = make_swarm(PredatorTeam(overrides={"prey.count": 3}))
     assert swarm.simulation.read("prey.pos")[1].shape == (1, 3)
@@ -93,22 +100,50 @@ def test_the_last_step_of_an_episode_has_its_info(name):
         assert last[f"_{term}"].all()
 
 
+class Watched(Flee):
+    """All components, with scales of both signs."""
+
+    observation = (
+        Own("forward quat vel health", scale={"forward": -2.0, "vel": 5.0}, frame="body"),
+        NearestOthers(
+            3, "offset distance direction relative_vel quat same_team present", radius=40.0, scale=-3.0
+        ),
+        Sectors(5, 60.0),
+        Means(50.0, "offset present", count_scale=2, frame="world"),
+        Each("hunters", "offset direction present"),
+        Computed(
+            2, lambda simulation: np.cos(simulation.read("prey.pos")[0][..., :2]), low=[-1.0, -2.0], high=1.0
+        ),
+    )
+
+
+def test_ranges_that_are_known_are_finite():
+    space = Watched().observation_space(0)
+    ends = [(float(a), float(b)) for a, b in zip(space.low.round(3), space.high.round(3), strict=True)]
+    free, other = (-np.inf, np.inf), [(-13.333, 13.333)] * 3 + [(-13.333, 0.0)] + [(-0.333, 0.333)] * 3
+    other += [free] * 3 + [(-0.333, 0.333)] * 4 + [(-0.333, 0.0)] * 2
+    want = [(-0.5, 0.5)] * 3 + [(-1.0, 1.0)] * 4 + [free] * 4 + 3 * other + [(0.0, 1.0)] * 5
+    want += [(0.0, np.inf)] + [(-50.0, 50.0)] * 3 + [(0.0, 1.0)]
+    want += 2 * ([free] * 3 + [(-1.0, 1.0)] * 3 + [(0.0, 1.0)]) + [(-1.0, 1.0), (-2.0, 1.0)]
+    np.testing.assert_allclose(np.array(ends), np.array(want), atol=2e-3)
+    assert make_vec(Watched).single_observation_space.shape == (6, len(want))
+    for wrong in ({"low": 1.0}, {"high": -1.0}, {"low": [-1.0, -1.0, -1.0]}):
+        with pytest.raises(ParameterError, match="Computed: low"):
+            make_swarm(Watched(observation=(Computed(2, np.cos, **wrong),)))
+
+
 @pytest.mark.parametrize("name", [*IDS, "own"])
 def test_observations_lie_in_their_space(name):
     task = Watched() if name == "own" else short(name)
     swarm = make_swarm(task, 3)
     swarm.reset(seed=1)
     chance = np.random.default_rng(1)
-    spaces = [task.observation_space(a) for a in range(swarm.n_agents)]
-    low, high = (np.stack([getattr(s, k) for s in spaces]) for k in ("low", "high")) if len(
-        {s.shape for s in spaces}
-    ) == 1 else (None, None)
+    space = world_spaces(task)[0]
+    low, high = (np.atleast_2d(k) for k in (space.low, space.high))
+    assert np.isfinite(low).any() or name in UNKNOWN
+    assert ((low <= 0) & (high >= 0)).all()
     for _ in range(20):
         shape = 3, swarm.n_agents, swarm.action_width
         actions = chance.choice([-1.0, 1.0], shape).astype(task.dtype)
         swarm.step(actions if swarm.is_continuous else (actions > 0).astype(int))
-        if low is not None:
-            assert ((swarm.obs >= low) & (swarm.obs <= high)).all()
-        else:
-            for a, space in enumerate(spaces):
-                assert all(space.contains(row[: space.shape[0]]) for row in swarm.obs[:, a])
+        assert ((swarm.obs >= low) & (swarm.obs <= high)).all()

@@ -151,7 +151,10 @@ def test_wrong_players_are_refused(policies, tmp_path):
     ):  # fmt: skip
         with pytest.raises(ParameterError, match=message):
             chase_league(*players)
-    with pytest.raises(ParameterError, match="tussle/Hover-v0 has no other side.*there are: tussle/Battle-v0, tussle/BattleBlue-v0"):
+    with pytest.raises(
+        ParameterError,
+        match=r"tussle/Hover-v0 has no other side.*there are: tussle/Battle-v0, tussle/BattleBlue-v0",
+    ):
         League("tussle/Hover-v0", ["rules"])
     with pytest.raises(ParameterError, match="did you mean 'tussle/Battle-v0'"):
         League("tussle/Batle-v0", ["rules"])

@@ -252,7 +252,10 @@ def test_tasks_end_by_their_own_rule(task):
 
     bad = make_swarm(Wrong)
     bad.reset(seed=1)
-    with pytest.raises(ParameterError, match="ends returns shape"):
+    with pytest.raises(
+        ParameterError,
+        match=r"Wrong.ends returns bool of shape \(1, 6\); it returns truth values, \(1,\), one per world",
+    ):
         bad.step(np.ones((1, 6, 2), np.float32))
 
 

@@ -57,7 +57,7 @@ def write_report(
         MissingExtraError: Matplotlib or Jinja is not installed.
         RecordError: The directory cannot be written.
     """
-    from tussle.batch.report.answers import answers
+    from tussle.batch.report.answers import answers, further
     from tussle.batch.report.drawing import house_style, pictured
     from tussle.batch.report.report_data import ReportData
 
@@ -65,16 +65,18 @@ def write_report(
         data = ReportData(results, quantities)
         sections = sections_of(data)
         pictures = {p.name: pictured(p.draw(), f"plot-{p.name}", p.title) for s in sections for p in s.plots}
-        short = answers(data)
+        asked = answers(data)
     from tussle.batch.report.sections import answer, notes
 
-    found = results.answers(target, over)
-    asked = [] if found is None else [f"{sentence}." for sentence in found.sentences()]
+    question, sentences = results.answers(target, over), list[str]()
+    if question is not None:
+        sentences = [f"{sentence}." for sentence in question.sentences()]
+        asked = [*further(question, results), *asked]
     page = write_page(
         Path(directory) / INDEX, sections, pictures,
         title=str(results.info.get("name") or "A batch of games"), version=str(results.info.get("tussle", "")),
         source="a batch in memory" if results.path is None else f"the batch {results.path.resolve().name}",
-        answer=" ".join([*asked, answer(data)]), answers=short, notes=notes(data),
+        answer=" ".join([*sentences, answer(data)]), answers=asked, notes=notes(data),
     )  # fmt: skip
     missing = "".join(sorted({letter for picture in pictures.values() for letter in picture.missing}))
     note = f"the font of the PNG files has no {missing}; the page and the SVG files show it"

@@ -10,11 +10,14 @@ from typing import Any
 
 import numpy as np
 
+from tussle.batch.further import further_runs
 from tussle.batch.report.formatting import capital, count, estimate, number, p_value, percent
 from tussle.batch.report.report_data import Measure, ReportData, strength_of
 from tussle.batch.response import FittedVariable, Response
+from tussle.batch.results import Results
 from tussle.batch.selection import written
 from tussle.batch.statistics import sign_test
+from tussle.batch.target import Answers
 from tussle.batch.variables import Range
 
 MOST_ASKED = 2
@@ -60,6 +63,12 @@ def answers(data: ReportData) -> list[Answer]:
     found.append(Answer("When did it go wrong?", f"{' '.join(_when(data))} {extreme}".strip(), command))
     found.append(Answer("Is it luck?", _luck(data, lead)))
     return [each for each in found if each.text]
+
+
+def further(question: Answers, results: Results) -> list[Answer]:
+    """Which runs would narrow the answer to the question of a target."""
+    runs = further_runs(question, results.info, results.path)
+    return [Answer("What would narrow it?", f"{capital(what)}:", command) for what, command in runs]
 
 
 def _short(data: ReportData, axis: FittedVariable) -> str:

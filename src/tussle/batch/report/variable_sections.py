@@ -70,14 +70,14 @@ def _effects_of(
         is_split = data.lines is not None and data.lines != axis and len(measures) > 1
         for some in [[m] for m in measures] if is_split else [list(measures)]:
             name = f"{stem}-{some[0].team}" if is_split else stem
-            what = f"{some[0].label} of {some[0].name}" if is_split else some[0].label
-            if is_split and some[0].is_share:
-                what = f"games won by {some[0].name}"
+            what = some[0].label
+            if len(some) == 1 and some[0].team is not None:
+                what = data.title(some[0].expression)
             draw = _curves if axis.is_number else _rows
             found.append(
                 Plot(
                     f"{name}-by-{file_name(axis.variable.name)}",
-                    f"{capital(what)} by {axis.variable.name}",
+                    f"{capital(what)}, by {axis.variable.name}",
                     _effect_caption(data, axis, some),
                     lambda draw=draw, axis=axis, some=some: draw(data, axis, some),  # type: ignore[misc]
                 )

@@ -239,11 +239,15 @@ class Comparison:
 
     def values(self, i: int, name: str) -> np.ma.MaskedArray[Any, Any]:
         """Return the values of a column of plugins at a time index, (n, k), in the order of the frame's ids; masked where there is none."""
-        parts = []
+        found: list[np.ma.MaskedArray[Any, Any]] = []
         for run, pair in zip((self.a, self.b), self._pairs, strict=True):
-            n, k = int(run.counts[pair[i]]), len(self.columns[name].parts)
-            parts.append(run.values(int(pair[i]), name) if name in run.columns else np.ma.masked_all((n, k)))
-        return np.ma.concatenate(parts)
+            if name in run.columns:
+                found.append(run.values(int(pair[i]), name))
+            else:
+                nothing = np.zeros((int(run.counts[pair[i]]), len(self.columns[name].parts)))
+                found.append(np.ma.array(nothing, mask=True))
+        both: np.ma.MaskedArray[Any, Any] = np.ma.vstack(found)
+        return both
 
     @property
     def has_shapes(self) -> bool:

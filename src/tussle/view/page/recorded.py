@@ -6,6 +6,7 @@ import json
 import math
 import struct
 from collections.abc import Sequence
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -19,7 +20,7 @@ from tussle.view.page.document import event_rows, game_document, scenery_blobs
 from tussle.view.page.drawing import drawing_message
 from tussle.view.page.facts import mission_facts
 from tussle.view.page.packing import ints, message, reals
-from tussle.view.page.recorded_curves import COLUMNS, column_changes, run_changes
+from tussle.view.page.recorded_curves import column_changes, quantities_of, run_changes
 from tussle.view.recording import Recording
 
 FILE_STATES, FILE_FRAMES = 150_000, 32
@@ -117,7 +118,7 @@ class RecordedData:
             **game_document(game, self._mission, self._viewer, self._title),
             "source": "embedded" if self._is_file else "range",
             "facts": facts,
-            "quantities": [] if self._is_file else list(COLUMNS.items()),
+            "quantities": [] if self._is_file else list(self._quantities.items()),
             "idShift": game.id_shift,
             "isComplete": game.is_complete,
             "nFrames": len(self.kept),
@@ -207,8 +208,8 @@ class RecordedData:
         ids = [self._game.frame(i).id for i in numbers]
         parts = [ints(np.array([len(each) for each in ids])), ints(np.concatenate(ids))]
         for name in self._game.columns:
-            values = np.ma.concatenate([self._game.values(i, name) for i in numbers])
-            parts += [reals(component) for component in values.astype(float).filled(np.nan).T]
+            values: np.ma.MaskedArray[Any, Any] = np.ma.vstack([self._game.values(i, name) for i in numbers])
+            parts += [reals(component) for component in np.ma.filled(values.astype(float), np.nan).T]
         return b"".join(parts)
 
     @property
@@ -219,11 +220,17 @@ class RecordedData:
             return [(game.a, 0, 0), (game.b, game.team_shift, game.id_shift)]
         return [(game, 0, 0)]
 
+    @cached_property
+    def _quantities(self) -> dict[str, str]:
+        """Columns of the entities of any of the runs, and their units."""
+        return {name: unit for run, _, _ in self._runs for name, unit in quantities_of(run).items()}
+
     def _column(self, who: str, column: str) -> bytes | None:
         """Changes of a column of an entity, in each run that has it."""
-        if not who.isdecimal() or len(who) > 9 or column not in COLUMNS:
+        if not who.isdecimal() or len(who) > 9 or column not in self._quantities:
             return None
-        changes = [column_changes(run, int(who), column, id_shift) for run, _, id_shift in self._runs]
+        runs = [run for run in self._runs if column in quantities_of(run[0])]
+        changes = [column_changes(run, int(who), column, id_shift) for run, _, id_shift in runs]
         return compact_json([each.document() for each in changes if each.t]).encode()
 
     def _shapes(self, first: int) -> bytes:

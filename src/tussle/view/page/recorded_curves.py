@@ -7,8 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from tussle.api.bodies import derived_from
-from tussle.errors import ParameterError
-from tussle.view.recording import Recording
+from tussle.view.recording import QUAT, VEL, Recording
 from tussle.view.series import Changes, CurveName
 
 COLUMNS = {
@@ -76,36 +75,34 @@ def _counted(quantity: CurveName, start: float, times: list[float]) -> Changes:
     return Changes(quantity, 0, t.tolist(), values.tolist())
 
 
+def quantities_of(run: Recording) -> dict[str, str]:
+    """Return the columns of a run's entities, also recorded ones of plugins, and their units."""
+    of_plugins = (zip(column.parts, column.units, strict=True) for column in run.columns.values())
+    return COLUMNS | {part: unit for pairs in of_plugins for part, unit in pairs}
+
+
 def column_changes(run: Recording, who: int, name: str, id_shift: int = 0) -> Changes:
     """Return a column of an entity over the frames; NaN in those without it.
 
     Args:
         run: The run.
         who: The entity.
-        name: One of `COLUMNS`.
+        name: One of `quantities_of` the run.
         id_shift: What is added to its id.
-
-    Raises:
-        ParameterError: There is no such column.
     """
-    if name not in COLUMNS:
-        raise ParameterError(f"{run.path}: there is no column {name!r}; there are {', '.join(COLUMNS)}")
-    stride = -(-run.n_frames // MOST_POINTS)
-    frames = range(0, run.n_frames, stride)
-    values = np.array([_value(run, i, who, name) for i in frames])
+    frames = np.arange(0, run.n_frames, -(-run.n_frames // MOST_POINTS))
+    rows = np.array([run.row_of(i, who) for i in frames.tolist()])
+    values = _values(run, rows, name)
     is_new = np.append(True, ~((values[1:] == values[:-1]) | (np.isnan(values[1:]) & np.isnan(values[:-1]))))
-    return Changes(
-        CurveName(name, None, who + id_shift), 0, run.t[::stride][is_new].tolist(), values[is_new].tolist()
-    )
+    quantity = CurveName(name, None, who + id_shift)
+    return Changes(quantity, 0, run.t[frames[is_new]].tolist(), values[is_new].tolist())
 
 
-def _value(run: Recording, i: int, who: int, name: str) -> float:
-    row = run.row_of(i, who)
-    if row < 0:
-        return np.nan
+def _values(run: Recording, rows: np.ndarray, name: str) -> np.ndarray:
+    """A column in some rows, (n,); NaN in those below 0."""
     if name == "speed":
-        return float(np.linalg.norm([run.value(row, axis) for axis in ("vx", "vy", "vz")]))
+        return np.asarray(np.sqrt(sum(run.values_at(rows, axis) ** 2 for axis in VEL)))
     if name in ("yaw", "climb", "roll"):
-        quat = np.array([[run.value(row, axis)] for axis in ("qw", "qx", "qy", "qz")])
-        return float(derived_from(name, quat)[0])
-    return run.value(row, name)
+        quat = np.stack([run.values_at(rows, axis) for axis in QUAT])
+        return np.where(rows < 0, np.nan, derived_from(name, quat))
+    return run.values_at(rows, name)

@@ -6,6 +6,7 @@ import math
 import socket
 import time
 import warnings
+from bisect import bisect_right
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -174,9 +175,7 @@ class Px4Link(AutopilotLink):
         elif kind == "HIL_ACTUATOR_CONTROLS":
             # PX4 stamps its answer with the time of the measurements. While PX4 starts, any will do: it may be slower than they come.
             is_stamped = bool(message.flags & LOCKSTEP_FLAG) and self.lockstep and self._has_controls
-            answered = (
-                sum(sent <= message.time_usec for sent in self._open) if is_stamped else len(self._open)
-            )
+            answered = bisect_right(self._open, message.time_usec) if is_stamped else len(self._open)
             if is_stamped and not answered:  # it is older than the controls that there are
                 return
             if any(map(math.isinf, message.controls)):

@@ -109,9 +109,7 @@ class Boundary(Interaction):
 
     def _is_through(self, w: WorldView, may: np.ndarray) -> np.ndarray:
         """Return which of the entities that `may`, (n,), have gone through the region in the step, (n,)."""
-        rows = np.flatnonzero(may)
-        may[rows] = self.region().crossed(w.start_pos[:, rows], w.pos[:, rows])
-        return may
+        return self.region().crossed(w.start_pos, w.pos, may)
 
     @service
     def is_inside(self, pos: np.ndarray) -> np.ndarray:

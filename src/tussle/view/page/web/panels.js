@@ -143,7 +143,8 @@ export class Panels {
     if (!(this.layer instanceof Live)) fillList(byId('metrics'), this.resultsAt(t));
     byId('scores').hidden = !scores.some(({ t: times }) => times.length) && !byId('metrics').children.length;
     this.scores.forEach(({ row, team, value, curve }, i) => {
-      row.hidden = !scores[i].t.length;
+      // Teams that capture nobody need no row.
+      row.hidden = !scores[i].t.length || (scored === 'captures' && !scores[i].v.some(Boolean));
       say(value, amount(scores[i].at(t)));
       this.drawCurve(curve, scores[i], range, t, team);
     });

@@ -71,6 +71,9 @@ export class SeriesBook {
   }
 }
 
+/** Width within which changes are drawn as one vertical line [pixels]. */
+const NARROW = 0.5;
+
 /**
  * Path of a quantity up to a time, as steps: level from change to change. It is broken where the quantity is not known.
  * @param {Series} series @param {number} until time of its end @param {(t: number) => number} x pixel of a time @param {(value: number) => number} y pixel of a value
@@ -80,13 +83,21 @@ export function steps({ t, v }, until, x, y) {
   let isOpen = false;
   const last = lastNotAfter(t, until);
   for (let k = 0; k <= last; k++) {
-    const [left, right, level] = [x(t[k]), x(k < last ? t[k + 1] : until), y(v[k])];
+    const left = x(t[k]);
+    let [level, right] = [y(v[k]), x(k < last ? t[k + 1] : until)];
     if (Number.isNaN(level)) {
       isOpen = false;
       continue;
     }
     if (isOpen) path.lineTo(left, level);
     else path.moveTo(left, level);
+    let [low, high] = [level, level];
+    while (right - left < NARROW && k < last && !Number.isNaN(v[k + 1])) {
+      k++;
+      [level, right] = [y(v[k]), x(k < last ? t[k + 1] : until)];
+      [low, high] = [Math.min(low, level), Math.max(high, level)];
+    }
+    if (low < high) [low, high, level].forEach((each) => path.lineTo(left, each));
     path.lineTo(right, level);
     isOpen = true;
   }
