@@ -77,7 +77,7 @@ export class Viewpoint {
     });
     const [best] = [shares(Math.max(head.bottom, right.bottom), 0), shares(head.bottom, beside)].sort((a, b) => freeShare(b) - freeShare(a));
     // Where panels cover nearly all, something is seen behind them.
-    return freeShare(best) > 0.06 ? best : { ...best, top: Math.min(best.top, 0.3), bottom: Math.min(best.bottom, 0.4) };
+    return freeShare(best) > 0.02 ? best : { ...best, top: Math.min(best.top, 0.3), bottom: Math.min(best.bottom, 0.4) };
   }
 
   /** Let the camera be of a mode. Following begins near whom it follows. @param {Mode} mode */
