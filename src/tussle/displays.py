@@ -17,6 +17,8 @@ MAX_WORD, MAX_LINE = 60, 200
 MAX_LISTED = 6
 """Items that a line lists."""
 MAX_COLUMNS = 12
+WHOLE = 1e9
+"""Real numbers below it are written without an exponent."""
 CELL = 'style="padding:1px 10px 1px 0;text-align:left;vertical-align:top"'
 
 
@@ -44,9 +46,17 @@ def counted(n: int, noun: str, plural: str = "") -> str:
     return f"{n:,} {noun if n == 1 else plural or f'{noun}s'}"
 
 
-def number(value: Any) -> str:
-    """Return a number with at most six digits; anything else as text."""
-    return f"{value:.6g}" if isinstance(value, float) else str(value)
+def number(value: Any, digits: int = 6) -> str:
+    """Return a real number with so many digits at most, and commas between thousands; anything else as text.
+
+    Terminal, pages and reports write "0.1235", "12,345.6" and "1.2e-7", and a number of more digits than that whole: "1,234,568".
+    """
+    if not isinstance(value, float):
+        return str(value)
+    if 10.0**digits <= abs(value) < WHOLE:
+        return f"{value:,.0f}"
+    mantissa, _, exponent = f"{value:,.{digits}g}".partition("e")
+    return f"{mantissa}e{int(exponent)}" if exponent else mantissa
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[Any]], room: int = MAX_TABLE) -> str:

@@ -124,6 +124,14 @@ def _path_problem(text: str, where: str) -> str:
 
 Inside = Checked(str, _path_problem)
 """A relative path that stays inside its base directory."""
+
+
+def _colour_problem(text: str, where: str) -> str:
+    return "" if re.fullmatch("#[0-9a-f]{6}", text) else _refused(where, text, 'a colour "#rrggbb"')
+
+
+Colour = Checked(str, _colour_problem)
+"""A colour "#rrggbb"."""
 Team = r"-?\d{1,10}"
 """Pattern of a team number as a field name."""
 

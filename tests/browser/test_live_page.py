@@ -115,7 +115,7 @@ def test_keys_and_marks_that_jump_to_events(game):
         watched.wait(f"Math.abs(player.t - {t}) < 1e-6")
     box = watched.tab.locator("#events").bounding_box()
     marks = watched.tab.evaluate("() => player.events")
-    share = marks[-1]["t"] / live.span[1]
+    share = marks[-1]["t"] / watched.tab.locator("#time").evaluate("(s) => Number(s.max)")
     watched.tab.mouse.click(box["x"] + 7.5 + share * (box["width"] - 15), box["y"] + 12)
     watched.until(lambda: live.t > times[1])
 

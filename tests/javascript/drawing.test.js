@@ -4,10 +4,10 @@ import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { Camera, pixelOf, placeBehind, STEEPEST } from '../../src/tussle/view/page/web/camera.js';
 import { decimalsOf, eventText, length, number, times } from '../../src/tussle/view/page/web/formatting.js';
-import { forward, halfTurn, minus, norm, unit } from '../../src/tussle/view/page/web/geometry.js';
+import { forward, halfTurn, minus, norm, rotated, turned, unit } from '../../src/tussle/view/page/web/geometry.js';
 import { prepared } from '../../src/tussle/view/page/web/models.js';
 import { Reader } from '../../src/tussle/view/page/web/packing.js';
-import { pairsWithin } from '../../src/tussle/view/page/web/reach.js';
+import { linkOpacity, pairsWithin, sectorMesh } from '../../src/tussle/view/page/web/reach.js';
 
 /** @param {ArrayLike<number>} a @param {ArrayLike<number>} b */
 const isNear = (a, b, error = 1e-9) => assert.ok(Array.from(a).every((v, i) => Math.abs(v - b[i]) <= error), `${Array.from(a)} is not ${Array.from(b)}`);
@@ -93,6 +93,41 @@ test('a box has sharp edges and flat sides, a fine roof round ones', () => {
   assert.ok(norm(minus(normals(steep.corners, 1), normals(steep.corners, 3))) > 0.5);
 });
 
+test('a field of view ends at its angles, and is closed', () => {
+  const degree = Math.PI / 180;
+  for (const [wide, tall] of [[120, 40], [200, 90], [360, 60], [90, 180], [360, 180]]) {
+    const { vertices, faces } = sectorMesh(wide * degree, tall * degree);
+    const corners = Array.from({ length: vertices.length / 3 }, (_, i) => vertices.slice(3 * i, 3 * i + 3)).slice(1);
+    const [turns, rises] = [corners.map(([x, y]) => Math.atan2(y, x)), corners.map(([, , z]) => Math.asin(Math.max(-1, Math.min(1, z))))];
+    if (tall < 180) isNear([Math.max(...turns), Math.min(...turns)].map(Math.abs), [wide / 2, wide / 2].map((angle) => angle * degree), 1e-9);
+    isNear([Math.max(...rises), Math.min(...rises)], [(tall / 2) * degree, (-tall / 2) * degree], 1e-6);
+    assert.ok(corners.every((corner) => Math.abs(norm(corner) - 1) < 1e-9));
+    // Each edge has a face on both sides: places are compared, as both ends of a full turn are one.
+    const key = (i) => vertices.slice(3 * i, 3 * i + 3).map((c) => (Math.round(c * 1e6) / 1e6) + 0).join(' ');
+    const seen = new Map();
+    for (let f = 0; f < faces.length; f += 3) {
+      for (let k = 0; k < 3; k++) {
+        const [a, b] = [key(faces[f + k]), key(faces[f + ((k + 1) % 3)])];
+        if (a !== b) seen.set(`${a} > ${b}`, (seen.get(`${a} > ${b}`) || 0) + 1);
+      }
+    }
+    for (const [edge, n] of seen) assert.equal(seen.get(edge.split(' > ').reverse().join(' > ')), n, `${wide} x ${tall}: ${edge}`);
+  }
+});
+
+test('attitudes are joined, and turn vectors', () => {
+  const half = Math.SQRT1_2;
+  const [left, down] = [[half, 0, 0, half], [half, 0, half, 0]];
+  isNear(rotated(left, [1, 0, 0]), [0, 1, 0]);
+  isNear(rotated(turned(left, down), [1, 0, 0]), rotated(left, rotated(down, [1, 0, 0])));
+  isNear(forward(turned(left, down)), [0, 0, -1]);
+});
+
+test('of many links each is the more transparent', () => {
+  assert.deepEqual([linkOpacity(0), linkOpacity(1)], [0.45, 0.45]);
+  assert.ok(linkOpacity(400) < linkOpacity(100) && linkOpacity(1e5) >= 0.1);
+});
+
 test('links join those in reach, each pair once', () => {
   const places = Array.from({ length: 60 }, (_, i) => [(i * 37) % 50, (i * 17) % 40, (i * 7) % 11]);
   const slow = places.flatMap((a, i) => places.slice(0, i).filter((b) => norm(minus(a, b)) <= 9));
@@ -108,7 +143,7 @@ test('whole numbers and differences of differences are read', () => {
 });
 
 test('numbers, lengths and times as text', () => {
-  assert.deepEqual([number(1234567), number(-0.04, 1), number(-2.5, 1)], ['1\u202f234\u202f567', '0.0', '−2.5']);
+  assert.deepEqual([number(1234567), number(-0.04, 1), number(-2.5, 1)], ['1,234,567', '0.0', '−2.5']);
   assert.deepEqual([1500, 2, 0.05, 0.002, 0.0005].map(length), ['1.5 km', '2 m', '5 cm', '2.0 mm', '0.50 mm']);
   assert.deepEqual([times(0.5), times(Infinity)], ['0.5×', 'max']);
   assert.deepEqual([0.1, 0.04, 1, 1e-9].map(decimalsOf), [1, 2, 1, 4]);

@@ -124,6 +124,7 @@ test('a live game keeps its frames, and forgets them when it jumps', () => {
   const frame = (t, epoch = 1) => layer.takeFrame({ epoch }, chunkBytes(t, [t], [{ id: 7, begin: 0, x: [2 * t] }]));
   frame(1);
   frame(2);
+  layer.advance(1);
   assert.deepEqual([layer.show(), layer.end, layer.past.length], [true, 2, 2]);
   assert.deepEqual(layer.velocity(7), [1, 0, 0]);
   layer.takePast({ epoch: 1, seconds: 5 }, chunkBytes(0, [0, 1], [{ id: 7, begin: 0, x: [0, 2] }, { id: 4, begin: 0, x: [90] }]));
@@ -134,6 +135,59 @@ test('a live game keeps its frames, and forgets them when it jumps', () => {
   assert.deepEqual([layer.past.length], [1]);
   layer.takePast({ epoch: 1, seconds: 5 }, new Uint8Array(0));
   assert.equal(layer.past.length, 1, 'what was asked for before the jump is not taken');
+});
+
+test('between two states of a live game entities are on the way, and arrive', () => {
+  const layer = new Live(pageData({ endTime: 60 }), nothing);
+  const clock = { now: 0 };
+  const real = performance.now;
+  /** Way east in steps, as the chunks have it. */
+  const way = () => 2 * (layer.shown.placeOf(7)[0] - 10);
+  const isNear = (a, b) => assert.ok(Math.abs(a - b) < 1e-2, `${a} is not ${b}`);
+  performance.now = () => 1000 * clock.now;
+  const frame = (t, now, x, more = []) => {
+    clock.now = now;
+    layer.takeFrame({ epoch: 1 }, chunkBytes(10 * t, [t], [{ id: 7, begin: 0, x: [x] }, ...more]));
+  };
+  try {
+    frame(1, 5, 0);
+    frame(1.1, 5.1, 2);
+    assert.deepEqual([layer.shown.t, layer.isSettled], [1, false], 'a state is approached over the time to the one before');
+    layer.advance(0.05);
+    layer.show();
+    isNear(layer.shown.t, 1.05);
+    isNear(way(), 1);
+    frame(1.2, 5.2, 6, [{ id: 8, begin: 0, x: [0] }]);
+    isNear(way(), 1);
+    assert.equal(layer.slotOf(8), -1, 'it is born at the end of the way');
+    for (const seconds of [0.05, 0.04]) layer.advance(seconds);
+    layer.show();
+    assert.ok(layer.shown.t > 1.1 && way() > 2, 'the way leads through the states');
+    layer.advance(0.5);
+    layer.show();
+    assert.deepEqual([layer.shown.t, layer.isSettled, layer.shown.n], [1.2, true, 2]);
+    frame(1.3, 5.3, 1e6);
+    layer.advance(0.05);
+    layer.show();
+    assert.ok(way() < 7, 'a jump has no way');
+    layer.status = /** @type {any} */ ({ isPaused: true });
+    frame(1.4, 5.4, 8);
+    assert.deepEqual([layer.shown.t, layer.isSettled], [1.4, true], 'a step of a paused game is shown at once');
+  } finally {
+    performance.now = real;
+  }
+});
+
+test('the time line of a live game reaches to the end that its mission has', () => {
+  const layer = new Live(pageData({ endTime: 60 }), nothing);
+  const status = (t, isOver) => layer.takeStatus(/** @type {any} */ ({ t, span: [0, t], events: { from: 0, rows: [] }, scores: {}, isOver }));
+  status(5, false);
+  assert.deepEqual([layer.end, layer.horizon], [5, 60]);
+  status(12, true);
+  assert.deepEqual([layer.end, layer.horizon], [12, 12], 'it is over before');
+  const endless = new Live(pageData({ endTime: null }), nothing);
+  endless.takeStatus(/** @type {any} */ ({ t: 5, span: [0, 5], events: { from: 0, rows: [] }, scores: {}, isOver: false }));
+  assert.equal(endless.horizon, 5);
 });
 
 test('events of a live game grow, and are cut where it takes another course', () => {

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from html.parser import HTMLParser
 
 import pytest
 
-from tussle import Block, Mission, Recorder, Simulation, load_run, stock
+from tussle import Block, Mission, Recorder, Simulation, displays, load_run, stock
 from tussle.api import Autonomy, Input, Param
 from tussle.batch import Batch
 from tussle.columns import Column
@@ -192,3 +193,15 @@ def test_tables_say_what_they_leave_out():
         "2 worlds",
     )
     assert listing(range(8)) == "0, 1, 2, 3, 4, 5, … (8)"
+
+
+@pytest.mark.parametrize(
+    ("value", "digits", "text"),
+    [
+        (0.123456789, 6, "0.123457"), (0.1235, 4, "0.1235"), (1234.5678, 6, "1,234.57"), (1234567.8, 6, "1,234,568"),
+        (12345.6, 4, "12,346"), (-0.5, 4, "-0.5"), (1.2e-7, 6, "1.2e-7"), (3e12, 6, "3e12"), (2.0, 6, "2"), (math.nan, 6, "nan"),
+        (-math.inf, 4, "-inf"), (123456, 6, "123456"), ("text", 6, "text"), (True, 6, "True"),
+    ],
+)  # fmt: skip
+def test_numbers_are_written_in_one_way(value, digits, text):
+    assert displays.number(value, digits) == text

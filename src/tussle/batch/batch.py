@@ -38,6 +38,7 @@ from tussle.engine.simulation import Simulation
 from tussle.errors import BatchError, ParameterError, PluginError
 from tussle.mission import Loaded, Mission, PluginFile, read_mission
 from tussle.mission.effects import exactly
+from tussle.palette import team_colours
 from tussle.record.run_file import versions
 
 if TYPE_CHECKING:
@@ -320,6 +321,12 @@ class Batch:
             teams.setdefault(block.team, []).append(block.name)
         return {team: ", ".join(names) for team, names in sorted(teams.items())}
 
+    @property
+    def team_colours(self) -> dict[int, str]:
+        """Team -> its colour, "#rrggbb"."""
+        viewer = {} if self.loaded is None else self.loaded.viewer.get("entities", {})
+        return team_colours((b.team, viewer.get(b.name, {}).get("color")) for b in self.mission.blocks)
+
     def info(self) -> dict[str, Any]:
         """The entries of `batch.json` that describe the plan."""
         mission = self.mission
@@ -349,6 +356,7 @@ class Batch:
             "n_runs": self.plan.n_runs,
             "n_groups": len(self.package.missions),
             "teams": self.team_names,
+            "colours": self.team_colours,
             "dt": mission.dt,
             "start": mission.start,
             "end": mission.end,

@@ -42,6 +42,7 @@ from tussle.batch.variables import Variable
 from tussle.batch.varied import variable_of
 from tussle.displays import counted, line, listing, page, table
 from tussle.errors import ParameterError, listed
+from tussle.palette import colour_of, on_paper
 from tussle.record.run import check_frames, frame_of, load_run
 
 if TYPE_CHECKING:
@@ -127,6 +128,12 @@ class Results:
         named = {int(team): str(name) for team, name in self.info["teams"].items()}
         found = (team for team in pc.unique(self.table["team"]).to_pylist() if team is not None)
         return dict(sorted(({team: f"team {team}" for team in found} | named).items()))
+
+    @cached_property
+    def colours(self) -> dict[int, str]:
+        """Number of each team -> its colour in plots, "#rrggbb"."""
+        known = {int(team): colour for team, colour in (self.info.get("colours") or {}).items()}
+        return {team: on_paper(known.get(team) or colour_of(team)) for team in self.teams}
 
     @cached_property
     def points(self) -> list[dict[str, Any]]:

@@ -6,7 +6,7 @@ from typing import Any
 
 from tussle.batch.plan import MOST_RUNS
 from tussle.batch.varied import variable_of
-from tussle.documents import Checked, Document, Either, Inside, Map, Maybe, Real, Team, Whole, problem
+from tussle.documents import Checked, Colour, Document, Either, Inside, Map, Maybe, Real, Team, Whole, problem
 from tussle.errors import BatchError, ParameterError, listed, nearest_name
 from tussle.record.table_values import COUNT, INT32, NUMBER, TEXT, Bounds, Rules
 
@@ -84,6 +84,7 @@ BATCH = Document(
             "n_runs": Whole(1, MOST_RUNS),
             "is_complete": bool,
             "teams": Map(str, Team),
+            "colours": Maybe(Map(Colour, Team)),
             "n_seeds_kept": Maybe(Whole()),
             "fingerprint": Maybe(str),
             "tussle": str,

@@ -12,6 +12,7 @@ from rich.padding import Padding
 from tussle.cli.progress import times
 from tussle.cli.tables import fact_list, number_tables, title
 from tussle.cli.terminal import put
+from tussle.displays import number
 from tussle.engine.result import WorldResult
 from tussle.engine.simulation import Simulation
 from tussle.event_texts import end_text
@@ -133,4 +134,4 @@ def _team_columns(result: WorldResult) -> Iterator[tuple[str, dict[int, Any]]]:
 
 
 def _number(value: Any) -> str:
-    return f"{value:.6g}" if isinstance(value, (int, float)) else str(value)
+    return f"{value:,}" if isinstance(value, int) and not isinstance(value, bool) else number(value)

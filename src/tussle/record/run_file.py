@@ -83,7 +83,7 @@ def write(
         "format": FORMAT,
         "is_complete": not about["interrupted"],
         **about,
-        "mission": _mission(mission),
+        "mission": mission_entry(mission),
         "grade": sim.grade,
         "laws": mission.compat or "tussle",
         "versions": versions(),
@@ -127,7 +127,8 @@ def put_whole(path: Path, text: str) -> None:
         raise
 
 
-def _mission(mission: Any) -> dict[str, Any]:
+def mission_entry(mission: Any) -> dict[str, Any]:
+    """The entry of `run.json` that describes a mission."""
     names = ("name", "dt", "start", "end", "motion_multiplier", "update", "end_conditions")
     return {name: getattr(mission, name) for name in names} | {
         "blocks": [

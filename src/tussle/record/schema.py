@@ -157,8 +157,12 @@ RUN = Document(
             "name": str,
             "dt": Real(5e-324),
             "start": Real(),
+            "end": Maybe(Real(is_any=True)),
             "end_conditions": Maybe([str]),
-            "blocks": [{"name": str, "team": Whole(-(2**31), 2**31 - 1), "plugins": [str]}],
+            "blocks": [
+                {"name": str, "team": Whole(-(2**31), 2**31 - 1), "count": Maybe(Whole()), "plugins": [str]}
+            ],
+            "world_plugins": Maybe([str]),
         },
         "worlds": [_WORLD],
         "versions": Map(str),

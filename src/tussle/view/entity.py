@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from tussle.api.bodies import BODY_UNITS, DERIVED, FLOATS, derive
-from tussle.columns import Subscribe
+from tussle.columns import Column, Numbers, Param, Subscribe
 from tussle.comms import EVERYONE, SAME_ENTITY
 from tussle.comms.topic import Delivery, TopicBuffer
 from tussle.engine.group import Group
@@ -17,6 +17,8 @@ from tussle.engine.simulation import Simulation
 from tussle.engine.table import Stored, Table
 from tussle.lists import RaggedColumn
 
+_COMPONENTS = {3: ("x", "y", "z"), 4: ("w", "x", "y", "z")}
+"""Names of the components of a vector and of a quaternion."""
 MOST_MESSAGES = 50
 """Messages that are listed, of received and of sent ones."""
 
@@ -30,12 +32,16 @@ class Reading:
         unit: Its SI unit; one per field where they differ, separated by blanks.
         fields: Names of the components.
         doc: Its description.
+        mission_unit: The unit of bare numbers in mission files, of a parameter; one per field where they differ. "" is `unit`.
+        is_parameter: The column is a parameter: it says what the plugin is, not what it does.
     """
 
     value: Any
     unit: str = ""
     fields: tuple[str, ...] = ()
     doc: str = ""
+    mission_unit: str = ""
+    is_parameter: bool = False
 
 
 @dataclass(frozen=True)
@@ -98,7 +104,10 @@ def entity_state(
         return None
     row = int(found[0])
     clock = simulation.state.context.clock
-    body = {name: Reading(_plain(getattr(bodies, name)[..., row]), BODY_UNITS[name]) for name in FLOATS}
+    body = {
+        name: Reading(_plain(getattr(bodies, name)[..., row]), BODY_UNITS[name], _COMPONENTS.get(k, ()))
+        for name, k in FLOATS.items()
+    }
     for name in ("yaw", "climb", "roll"):
         angle = np.empty(1)
         assert DERIVED[name] == 1
@@ -132,23 +141,34 @@ def _plain(value: Any) -> Any:
     return array if array.ndim else array.item()
 
 
+def _about(column: Column) -> dict[str, Any]:
+    """What a reading says of its column."""
+    if not isinstance(column, Numbers):
+        return {"doc": column.doc}
+    is_parameter = isinstance(column, Param)
+    mission_unit = " ".join(unit or "1" for unit in column.text_units) if is_parameter else ""
+    return {
+        "unit": column.unit, "fields": column.fields, "doc": column.doc, "mission_unit": mission_unit, "is_parameter": is_parameter,
+    }  # fmt: skip
+
+
 def _read_plugins(group: Group, row: int, held: Table | Stored, into: dict[str, dict[str, Reading]]) -> None:
     """Add the columns of an entity's plugins in the order of their declaration, without the outputs that a plugin leaves out."""
     for binding in group.walk():
         columns = into[".".join(binding.path)] = {}
         for name, column in type(binding.spec).columns.items():
-            about = (getattr(column, "unit", ""), getattr(column, "fields", ()), column.doc)
+            about = _about(column)
             place = binding.places.get(name)
             if name in binding.asked.skipped:
                 continue
             if place is not None:
                 data = held.arrays[place.dtype]
                 part = data[place.first : place.first + place.k] if place.k else data[place.first]
-                columns[name] = Reading(_plain(part[..., row]), *about)
+                columns[name] = Reading(_plain(part[..., row]), **about)
             elif name in binding.ragged:
-                columns[name] = Reading(np.array(held.lists[binding.ragged[name]][row].T), *about)
+                columns[name] = Reading(np.array(held.lists[binding.ragged[name]][row].T), **about)
             elif name in binding.spec.values and name not in type(binding.spec).children():
-                columns[name] = Reading(binding.spec.values[name], *about)
+                columns[name] = Reading(binding.spec.values[name], **about)
 
 
 def _heard(group: Group, world: int, who: int) -> list[ShownMessage]:

@@ -25,6 +25,7 @@ from tussle.view.playback import Order, PlaybackController
 from tussle.view.player import Injection, Player
 from tussle.view.scenery import Scenery, scenery_of
 from tussle.view.series import CurveName
+from tussle.view.sight import fields_of_view
 from tussle.view.style import Style
 
 FRAME_PERIOD = 1.0 / 30.0
@@ -428,9 +429,10 @@ class Live:
     @cached_property
     def style(self) -> Style:
         """Colours and models of the entities."""
-        plugins = [[type(p).__name__ for p in b.plugins] for b in self.simulation.mission.blocks]
-        boxes = [b.box for b in self.simulation.mission.blocks]
-        return Style(self.blocks, self.block_teams, plugins, self.viewer, boxes)
+        blocks = self.simulation.mission.blocks
+        plugins = [[type(p).__name__ for p in b.plugins] for b in blocks]
+        boxes, views = [b.box for b in blocks], [fields_of_view(b) for b in blocks]
+        return Style(self.blocks, self.block_teams, plugins, self.viewer, boxes, views)
 
     @cached_property
     def scenery(self) -> Scenery:

@@ -23,6 +23,7 @@ from tussle.record.schema import MISSION_FILE, RUN_FILE, SHAPES_FILE, TRAJECTORY
 from tussle.view.drawn import Shape
 from tussle.view.frame import Event, Frame, empty_frame
 from tussle.view.scenery import Scenery, scenery_of
+from tussle.view.sight import fields_of_view
 from tussle.view.style import Style
 
 MOST_EMPTY = 5_000_000
@@ -503,9 +504,13 @@ class Recording:
     @cached_property
     def style(self) -> Style:
         """Colours and models of the entities."""
-        box_of = {block.name: block.box for block in self.mission.blocks} if self.mission else {}
-        boxes = [box_of.get(name) for name in self.blocks]
-        return Style(self.blocks, self.block_teams, self._plugins, self.viewer, boxes)
+        known = {block.name: block for block in self.mission.blocks} if self.mission else {}
+        blocks = [known.get(name) for name in self.blocks]
+        boxes, views = (
+            [b.box if b else None for b in blocks],
+            [fields_of_view(b) if b else () for b in blocks],
+        )
+        return Style(self.blocks, self.block_teams, self._plugins, self.viewer, boxes, views)
 
     @cached_property
     def scenery(self) -> Scenery:

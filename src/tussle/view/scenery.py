@@ -63,6 +63,7 @@ class Scenery:
         terrain: The terrain; None for flat ground.
         background: Red, green, blue, 0 to 255; None for the default.
         notes: Viewer tags that were not followed, one line each.
+        has_ground: Something in the mission says where the ground is; otherwise entities may be at any height.
     """
 
     origin: Origin
@@ -76,6 +77,7 @@ class Scenery:
     terrain: Terrain | None = None
     background: tuple[int, int, int] | None = None
     notes: tuple[str, ...] = ()
+    has_ground: bool = True
 
     @property
     def size(self) -> float:
@@ -137,7 +139,14 @@ def scenery_of(
         terrain=None if hills is None else Terrain.of(hills),
         background=_background(viewer, notes),
         notes=tuple(notes),
+        has_ground=mission is None or _has_ground(mission, hills),
     )
+
+
+def _has_ground(mission: Mission, hills: HeightField | None) -> bool:
+    """Return True if the scene has a ground or a terrain, or a plugin a ground level."""
+    levels = (name for p in mission.interactions for name in p.values if name.startswith("ground_"))
+    return mission.scene.ground is not None or hills is not None or any(levels)
 
 
 def _start(block: Block) -> list[np.ndarray]:

@@ -7,8 +7,9 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from tussle.palette import colour_of, rgb_of
+from tussle.palette import colour_in, colour_of, rgb_of, team_colours
 from tussle.view.shapes import MODELS
+from tussle.view.sight import Sight
 
 Colour = tuple[int, int, int]
 
@@ -40,8 +41,8 @@ _MOTION_WORDS: Mapping[str, tuple[str, ...]] = {
 class Style:
     """Colours and models of a mission's entities.
 
-    A block has its `<color>`, else that of its team. A team has the colour of its first block with one, else a colour of the palette
-    by its number. The model is the one nearest to `visual_model`, else a box of its own lengths for entities that are boxes, else one that
+    A block has its `<color>`, else the colour of its team: that of the first block with one, else a colour of the palette by the team's
+    number. The model is the one nearest to `visual_model`, else a box of its own lengths for entities that are boxes, else one that
     suits the motion model. `visual_rpy` is ignored: it turns the meshes of SCRIMMAGE, and these point forward.
 
     Args:
@@ -50,6 +51,7 @@ class Style:
         plugins: Names of the classes of each block's plugins, which choose the model of a block without `visual_model`.
         viewer: Viewer tags of the mission file, see `tussle.mission.Loaded`.
         boxes: Lengths of each block's entities along their axes [m], (3,); None where they are no boxes.
+        views: What the plugins of each block see.
 
     Attributes:
         notes: Viewer tags that were not followed, one line each.
@@ -62,6 +64,7 @@ class Style:
         plugins: Sequence[Sequence[str]] = (),
         viewer: Mapping[str, Any] | None = None,
         boxes: Sequence[Sequence[float] | None] = (),
+        views: Sequence[Sequence[Sight]] = (),
     ) -> None:
         self.notes: list[str] = []
         self._teams = list(teams)
@@ -71,6 +74,7 @@ class Style:
         self._scales = [
             self._read_scale(name, s.get("visual_scale")) for name, s in zip(blocks, own, strict=True)
         ]
+        self._views = [*views, *[()] * (len(blocks) - len(views))]
         self._boxes = [*boxes, *[None] * (len(blocks) - len(boxes))]
         self._models = [
             self._read_model(
@@ -78,10 +82,8 @@ class Style:
             )
             for i, (name, s) in enumerate(zip(blocks, own, strict=True))
         ]
-        self._by_team: dict[int, Colour] = {}
-        for team, colour in zip(teams, self._colours, strict=True):
-            if colour is not None:
-                self._by_team.setdefault(team, colour)
+        written = team_colours((team, s.get("color")) for team, s in zip(teams, own, strict=True))
+        self._by_team = {team: rgb_of(colour) for team, colour in written.items()}
 
     def colour(self, team: int) -> Colour:
         """Red, green, blue of a team, 0 to 255."""
@@ -94,6 +96,10 @@ class Style:
     def model(self, block: int) -> str:
         """Name of the model of a block by its number, in `MODELS`."""
         return self._models[block]
+
+    def views(self, block: int) -> Sequence[Sight]:
+        """What the plugins of a block see, by its number."""
+        return self._views[block]
 
     def lengths(self, block: int) -> tuple[float, float, float]:
         """Lengths of an entity of a block along its axes [m]: factors by which its model, 1 m long, is enlarged."""
@@ -112,14 +118,13 @@ class Style:
     def _read_colour(self, block: str, text: str | None) -> Colour | None:
         if text is None:
             return None
-        numbers = re.findall(r"-?\d+(?:\.\d+)?", text)
-        values = [round(float(n)) for n in numbers]
-        if len(values) != 3 or not all(0 <= v <= 255 for v in values):
+        colour = colour_in(text)
+        if colour is None:
             self.notes.append(
                 f"block {block!r}: color {text!r} is not three numbers from 0 to 255; the team's colour is used"
             )
             return None
-        return values[0], values[1], values[2]
+        return rgb_of(colour)
 
     def _read_scale(self, block: str, text: str | None) -> float:
         try:

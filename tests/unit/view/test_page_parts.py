@@ -1,5 +1,6 @@
 """What the page is made of, piece by piece: its document, texts, modules and keys."""
 
+import math
 import re
 from importlib.resources import files
 from pathlib import Path
@@ -29,8 +30,8 @@ def live():
 
 
 def test_how_far_plugins_reach_is_where_rings_begin():
-    assert reach_of(read_mission("predator_prey").mission)[0] == 200.0
-    assert reach_of(None) == (0.0, 0.0)
+    assert reach_of(read_mission("predator_prey").mission) == 200.0
+    assert reach_of(None) == 0.0
 
 
 def test_the_missions_camera_is_where_one_begins():
@@ -88,8 +89,53 @@ def test_values_as_text(value, text):
 
 
 def test_units_of_fields_that_are_alike_are_said_once():
-    assert formatting.reading(Reading(np.zeros(2), "m m")) == "0  0 m"
-    assert formatting.reading(Reading(np.zeros(2), "m rad")) == "0  0 m rad"
+    assert formatting.reading(Reading(np.zeros(2), "m m")) == "0  0\N{NO-BREAK SPACE}m"
+    assert formatting.reading(Reading(np.zeros(2), "m rad")) == "0\N{NO-BREAK SPACE}m  0°"
+
+
+@pytest.mark.parametrize(
+    ("reading", "text"),
+    [
+        (Reading(math.pi / 3, "rad"), "60°"),
+        (Reading(-0.5, "rad/s"), "−0.5 rad/s"),
+        (Reading(math.pi / 3, "rad/s", mission_unit="deg/s", is_parameter=True), "60°/s"),
+        (Reading(math.pi / 3, "rad", mission_unit="rad", is_parameter=True), "1.047 rad"),
+        (Reading(10.0, "m/s", mission_unit="kt", is_parameter=True), "19.44 kt"),
+        (
+            Reading(np.array([1.0, -2.0, 0.5]), "m", ("velocity_x", "velocity_y", "velocity_z")),
+            "x 1  y −2  z 0.5 m",
+        ),
+        (
+            Reading(np.array([1.0, 2.0, math.pi]), "1/s 1 rad", ("p", "i", "limit"), "", "1/s 1 deg", True),
+            "p 1 1/s  i 2  limit 180°",
+        ),
+        (
+            Reading(np.array([[3.0, 0.25 * math.pi], [12345.0, 0.0]]), "1 rad", ("id", "bearing")),
+            "2 rows (id  bearing): 3  45;  12,345  0",
+        ),
+        (Reading(np.zeros((0, 2)), "m", ("x", "y")), "–"),
+        (Reading("none", "rad"), "none"),
+        (Reading(True), "yes"),
+        (Reading(7), "7"),
+        (Reading(np.arange(8.0), "m", tuple("abcdefgh")), "a 0  b 1  c 2  d 3  e 4  f 5 … (8) m"),
+    ],
+)
+def test_values_have_the_units_of_missions_and_the_names_of_their_components(reading, text):
+    assert formatting.reading(reading).replace(formatting.NARROW, " ") == text
+
+
+def test_what_a_plugin_does_stands_before_what_it_is():
+    columns = {
+        "gain": Reading(1.0, is_parameter=True),
+        "desired_heading": Reading(0.1, "rad"),
+        "goal": Reading(2.0, "m"),
+    }
+    state = EntityState(0.0, 0, 1, 1, "drone", {}, {"Mine": columns})
+    assert formatting.entity_sections(state)[1][1] == [
+        ("desired heading", "5.73°"),
+        ("goal", "2\N{NO-BREAK SPACE}m"),
+        ("gain", "1"),
+    ]
 
 
 def test_an_entity_is_told_with_its_plugins_and_messages():
@@ -99,8 +145,8 @@ def test_an_entity_is_told_with_its_plugins_and_messages():
         [ShownMessage("Net/Topic", 0, {"x": 1})], [ShownMessage("Net/Topic", 2, {})],
     )  # fmt: skip
     assert formatting.entity_sections(state) == [
-        ("", [("pos", "0  0  0 m")]),
-        ("Mine", [("goal", "2 m")]),
+        ("", [("pos", "0  0  0\N{NO-BREAK SPACE}m")]),
+        ("Mine", [("goal", "2\N{NO-BREAK SPACE}m")]),
         ("heard", [("Net/Topic", "world: x 1")]),
         ("said", [("Net/Topic", "2: ")]),
     ]

@@ -261,8 +261,14 @@ def test_heights_are_exaggerated_where_all_is_flat_and_the_plot_says_so(hunted, 
     assert deep.legends[0].get_title().get_text().startswith("Trajectories in space · hunt")
 
 
-def test_all_of_a_scene_in_space_lies_on_the_figure(hunted):
-    figure = trajectory3d(Trajectories(Recording(hunted)))
+@pytest.mark.parametrize(
+    "place", [(0.0, 0.0, 0.0), (2500.0, 0.0, 60.0), (0.0, 90000.0, 10.0), (3.0, 3.0, 900.0)]
+)
+def test_all_of_a_scene_in_space_lies_on_the_figure(hunted, tmp_path, place):
+    far = Block(name="far", team=3, position=place, motion=Still())
+    near = Block(name="near", team=4, position=(0, 0, 1), motion=Still())
+    run = record(Mission(blocks=[near, far], end=0.2), tmp_path / "run") if any(place) else hunted
+    figure = trajectory3d(Trajectories(Recording(run)))
     figure.draw_without_rendering()
     axes = figure.axes[0]
     boxes = [axis.get_tightbbox() for axis in (axes.xaxis, axes.yaxis, axes.zaxis)]
@@ -581,3 +587,36 @@ def test_without_matplotlib_the_extra_is_named(monkeypatch, collided, tmp_path):
     ):
         write_plots(Recording(collided), tmp_path / "plots")
     assert not (tmp_path / "plots").exists()
+
+
+def test_a_legend_lists_what_is_drawn_only(tmp_path):
+    mission = hunt(end=4.0, end_conditions="time")
+    still = Block(name="still", team=7, count=2, position=(60, 0, 200), motion=Still())
+    run = Recording(record(mission.replace(blocks=[*mission.blocks, still]), tmp_path / "run"))
+    tracks = Trajectories(run)
+    figure = trajectory(tracks)
+    assert legend_of(figure) == ["prey, late", "hunters", "still", "first", "last", "died"]
+    handles = dict(zip(legend_of(figure), figure.legends[0].legend_handles, strict=True))
+    assert handles["still"].get_marker() == "s", "nobody of it has moved: there is no line"
+    assert handles["hunters"].get_linestyle() == "-"
+    dead = tuple(h.id for h in run.events if h.kind == "death")
+    chosen = Trajectories(run, Selection(entities=dead))
+    lines = [name for name in chosen.teams.values() if name != "still"]
+    assert [name for name in legend_of(trajectory(chosen)) if name != "still"] == [*lines, "first", "died"]
+    assert "died" in legend_of(altitude(Trajectories(run, Selection(entities=dead[:2]))))
+    living = tuple(set(tracks.who.tolist()) - set(dead))
+    assert "died" not in legend_of(altitude(Trajectories(run, Selection(entities=living))))
+
+
+def test_a_long_name_stands_in_the_title_in_full(tmp_path):
+    name = "Do four guards find eight intruders in the night, or do they need more of them? " * 2
+    run = Recording(record(hunt(end=1.0, name=name), tmp_path / "run"))
+    for plot in (trajectory, trajectory3d, altitude):
+        figure = plot(Trajectories(run))
+        figure.draw_without_rendering()
+        title = figure.legends[0].get_title()
+        assert "".join(title.get_text().split()).endswith("".join(f"{name}".split()) + ",seed1")
+        box = title.get_window_extent()
+        assert box.x0 >= 0.0
+        assert box.x1 <= figure.bbox.width
+        assert box.y1 <= figure.bbox.height

@@ -18,7 +18,7 @@ from tussle.batch.sampling import method_for
 from tussle.batch.sensitivity import Effect
 from tussle.batch.statistics import mean_of
 from tussle.errors import ParameterError
-from tussle.palette import MUTED, colour_of
+from tussle.palette import MUTED
 
 _TITLES = {
     "wins": "games won by {}",
@@ -46,6 +46,7 @@ class Measure:
         team: Its team; None if it belongs to no single team.
         label: Label of its axis.
         is_share: The quantity is 0 or 1 in each run.
+        colour: That of the team.
     """
 
     expression: str
@@ -53,10 +54,7 @@ class Measure:
     team: int | None
     label: str
     is_share: bool = False
-
-    @property
-    def colour(self) -> str:
-        return MUTED if self.team is None else colour_of(self.team)
+    colour: str = MUTED
 
     @property
     def marker(self) -> str:
@@ -87,6 +85,12 @@ class ReportData:
     def name_of(self, team: int) -> str:
         """The name of a team."""
         return self.results.teams.get(team) or f"team {team}"
+
+    def _measure(self, name: str, team: int, label: str, is_share: bool = False) -> Measure:
+        """A quantity of a team."""
+        return Measure(
+            f"{name}[{team}]", self.name_of(team), team, label, is_share, self.results.colours[team]
+        )
 
     def title(self, expression: str) -> str:
         """The name of a quantity."""
@@ -193,7 +197,7 @@ class ReportData:
         """Wins of the teams that score or win; empty for games without scores."""
         teams = [t for t in self.rivals if t in self.results.scored] if len(self.results.scored) > 1 else []
         teams = [t for t in teams if not self._is_asked(f"wins[{t}]")]
-        return tuple(Measure(f"wins[{t}]", self.name_of(t), t, "share of the games won", True) for t in teams)
+        return tuple(self._measure("wins", t, "share of the games won", True) for t in teams)
 
     @cached_property
     def scores(self) -> tuple[Measure, ...]:
@@ -204,7 +208,7 @@ class ReportData:
             match = _OF_TEAM.fullmatch(name)
             if match is not None and not self._is_asked(name):
                 team = int(match[2])
-                found.append(Measure(name, self.name_of(team), team, kinds[match[1]]))
+                found.append(self._measure(match[1], team, kinds[match[1]]))
         return tuple(found)
 
     @cached_property

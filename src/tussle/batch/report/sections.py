@@ -29,7 +29,7 @@ from tussle.batch.report.report_data import Measure, ReportData
 from tussle.batch.selection import written
 from tussle.batch.variables import Range
 from tussle.event_texts import END_TEXTS, end_text
-from tussle.palette import PAPER, colour_of, mixed
+from tussle.palette import PAPER, mixed
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -126,7 +126,7 @@ def won(data: ReportData) -> Section:
         return Section("won", "Who won")
     shares = [s for s in data.results.shares() if s.team is None or s.team in data.rivals]
     shares.sort(key=lambda s: (s.team is None, -s.n, s.team or 0))
-    colours = [plots.END_COLOURS["time"] if s.team is None else colour_of(s.team) for s in shares]
+    colours = [plots.END_COLOURS["time"] if s.team is None else data.results.colours[s.team] for s in shares]
     blocks = ""
     if data.has_points:
         is_shared = not data.results.info.get("independent")
@@ -260,7 +260,7 @@ def _left(data: ReportData, teams: Sequence[int]) -> Plot:
         f"{names} left over time",
         "Mean number of each team that is left. Band: 95 % interval of the mean at each time. Games that ended keep their last number.",
         lambda: plots.over_time(
-            [_curve(data, t, None, data.name_of(t), colour_of(t), "-") for t in teams],
+            [_curve(data, t, None, data.name_of(t), data.results.colours[t], "-") for t in teams],
             f"{names} left" if len(teams) == 1 else "number left",
         ),
     )
@@ -269,7 +269,7 @@ def _left(data: ReportData, teams: Sequence[int]) -> Plot:
 def _left_by_point(data: ReportData, team: int) -> Plot:
     n, name = len(data.points), data.name_of(team)
     dashes = ["-", "--", "-.", ":", (0, (5, 1)), (0, (1, 1))]
-    ramp = [mixed(colour_of(team), PAPER, 0.45 * (1.0 - i / (n - 1))) for i in range(n)]
+    ramp = [mixed(data.results.colours[team], PAPER, 0.45 * (1.0 - i / (n - 1))) for i in range(n)]
     return Plot(
         f"left-{team}-by-point",
         f"{name} left, by {data.results.variables[0].name if len(data.results.variables) == 1 else 'point'}",

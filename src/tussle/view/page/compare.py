@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -15,6 +16,7 @@ from tussle.view.drawn import Shape
 from tussle.view.frame import Event, Frame
 from tussle.view.page.settings import differing_settings
 from tussle.view.scenery import Scenery
+from tussle.view.sight import Sight
 from tussle.view.style import Colour, Style
 
 if TYPE_CHECKING:
@@ -302,6 +304,9 @@ class _Both:
 
     def model(self, block: int) -> str:
         return self._a.model(block) if block < self._n else self._b.model(block - self._n)
+
+    def views(self, block: int) -> Sequence[Sight]:
+        return self._a.views(block) if block < self._n else self._b.views(block - self._n)
 
     def lengths(self, block: int) -> tuple[float, float, float]:
         return self._a.lengths(block) if block < self._n else self._b.lengths(block - self._n)

@@ -16,6 +16,7 @@ from tussle.view.frame import Event
 from tussle.view.page.packing import ints
 from tussle.view.scenery import Scenery
 from tussle.view.shapes import MODELS, Mesh
+from tussle.view.sight import Sight, range_of
 from tussle.view.solids import MOST_FACES
 from tussle.view.style import Style
 from tussle.view.terrain import Terrain
@@ -25,9 +26,6 @@ FORMAT = 2
 MOST_HEIGHTS = 250_000
 """Heights of the terrain on the page: with some half a million triangles a browser still draws without effort."""
 HEIGHT_STEPS = 65_535
-RANGES = ("range", "comms_range", "max_range", "detection_range", "sensing_range", "sphere_of_influence")
-ANGLES = ("fov_az", "fov", "field_of_view", "fov_el")
-"""Parameters of plugins that say how far entities hear or see, and in which angle."""
 
 
 class Game(Protocol):
@@ -66,7 +64,6 @@ def game_document(
     viewer, style, scenery = viewer or {}, game.style, game.scenery
     notes = [*style.notes, *scenery.notes, *filter(None, [terrain_note(scenery)])]
     opening = opening_data(viewer.get("camera"), notes)
-    reach, angle = reach_of(mission)
     models = {style.model(i) for i in range(len(game.blocks))} | {"sphere"}
     return {
         "format": FORMAT,
@@ -79,6 +76,7 @@ def game_document(
                 "colour": list(style.block_colour(i)),
                 "model": style.model(i),
                 "lengths": style.lengths(i),
+                "views": [view_data(view) for view in style.views(i)],
             }
             for i, name in enumerate(game.blocks)
         ],
@@ -89,8 +87,7 @@ def game_document(
         "models": {name: mesh_data(MODELS[name], 4) for name in MODELS if name in models},
         "scenery": scenery_data(scenery),
         "opening": opening,
-        "reach": reach,
-        "angle": math.degrees(angle),
+        "reach": reach_of(mission),
         "scale": float(viewer.get("scale") or 1.0),
         "hasTrails": bool(viewer.get("plot_tracks", False)),
         "notes": list(dict.fromkeys([*notes, *game.notes])),
@@ -130,22 +127,25 @@ def opening_data(said: Mapping[str, Any] | None, notes: list[str]) -> dict[str, 
     return {"position": position, "target": target, "mode": mode or "free", "follow": who}
 
 
-def reach_of(mission: Mission | None) -> tuple[float, float]:
-    """Return range of communication or sight [m] and field of view [rad] of the entities; 0 if no plugin declares it.
+def reach_of(mission: Mission | None) -> float:
+    """Return the range of communication or sight of the entities [m]; 0 if no plugin declares one.
 
     The first parameter that names a range counts, networks before others: a range of what is heard is what links are about.
     """
-    reach = angle = 0.0
     plugins = [] if mission is None else [*mission.networks, *(p for b in mission.blocks for p in b.plugins)]
-    for plugin in plugins:
-        for name, value in plugin.values.items():
-            if not isinstance(value, (int, float)) or isinstance(value, bool) or not 0.0 < value < 1e6:
-                continue
-            if not reach and name in RANGES:
-                reach = float(value)
-            if not angle and name in ANGLES and value < 2.0 * np.pi - 1e-6:
-                angle = float(value)
-    return reach, angle
+    return next((reach for p in plugins if (reach := range_of(p)) is not None and math.isfinite(reach)), 0.0)
+
+
+def view_data(view: Sight) -> dict[str, Any]:
+    """Return a field of view with angles in degrees, as missions have them; a range without end is None."""
+    return {
+        "plugin": view.plugin,
+        "azimuth": math.degrees(view.azimuth),
+        "elevation": None if view.elevation is None else math.degrees(view.elevation),
+        "range": view.range if math.isfinite(view.range) else None,
+        "pos": view.pos,
+        "quat": view.quat,
+    }
 
 
 def rounded(values: Any, digits: int) -> list[Any]:
@@ -176,6 +176,7 @@ def scenery_data(scenery: Scenery) -> dict[str, Any]:
         "low": rounded(scenery.low, digits),
         "high": rounded(scenery.high, digits),
         "ground": scenery.ground,
+        "hasGround": scenery.has_ground,
         "gridStep": scenery.grid_step,
         "originLength": scenery.origin_length,
         "background": scenery.background and list(scenery.background),

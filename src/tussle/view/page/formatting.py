@@ -2,34 +2,39 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
+from tussle import displays
 from tussle.engine.result import WorldResult
+from tussle.units import split_units, unit_of
 from tussle.view.entity import EntityState, Reading, ShownMessage
 
 MOST_ITEMS = 6
 """Of a list, in a reading or a message."""
 MOST_LETTERS = 8
+NARROW = "\N{NO-BREAK SPACE}"
+"""Keeps a number with its name and its unit on one line."""
+MINUS = "\N{MINUS SIGN}"
 Row = tuple[str, str]
 
 
 def number(value: Any) -> str:
-    """Format a number with its significant digits."""
+    """Format a number as terminal and reports do, with four digits; of a list the first items."""
     if isinstance(value, (bool, np.bool_)):
         return "yes" if value else "no"
     if isinstance(value, (int, np.integer)):
-        return f"{value:,}"
+        return f"{value:,}".replace("-", MINUS)
     if isinstance(value, (float, np.floating)):
-        return f"{value:,.4g}"
+        return displays.number(float(value), 4).replace("-", MINUS)
     if isinstance(value, np.ndarray) and value.ndim == 1:
         more = "" if len(value) <= MOST_ITEMS else f" … ({len(value)})"
-        return "  ".join(f"{v:,.4g}" for v in value[:MOST_ITEMS]) + more
+        return "  ".join(map(number, value[:MOST_ITEMS])) + more
     if isinstance(value, np.ndarray):
         rows = ";  ".join(number(row) for row in value[:MOST_ITEMS])
-        return f"{len(value)} rows: {rows}" if len(value) else "–"
+        return f"{displays.counted(len(value), 'row')}: {rows}" if len(value) else "–"
     return str(value)
 
 
@@ -57,11 +62,9 @@ def _by_team(values: Mapping[Any, Any], teams: Mapping[int, str]) -> str:
 
 
 def entity_sections(state: EntityState) -> list[tuple[str, list[Row]]]:
-    """Return titles and rows of an entity: body, columns of plugins, messages."""
+    """Return titles and rows of an entity: body, columns of plugins, what they do before their parameters, and messages."""
     body = [(key, reading(r)) for key, r in state.body.items() if key not in ("force", "torque")]
-    plugins = [
-        (name, [(key, reading(r)) for key, r in columns.items()]) for name, columns in state.plugins.items()
-    ]
+    plugins = [(name, _column_rows(columns)) for name, columns in state.plugins.items()]
     letters = [
         (title, [_letter(letter) for letter in said[-MOST_LETTERS:]])
         for title, said in (("heard", state.heard), ("said", state.said))
@@ -69,11 +72,55 @@ def entity_sections(state: EntityState) -> list[tuple[str, list[Row]]]:
     return [("", body), *(section for section in (*plugins, *letters) if section[1])]
 
 
+def _column_rows(columns: Mapping[str, Reading]) -> list[Row]:
+    in_order = sorted(columns.items(), key=lambda item: item[1].is_parameter)
+    return [(key.replace("_", " "), reading(r)) for key, r in in_order]
+
+
 def reading(value: Reading) -> str:
-    """Format a value with its unit; a unit that all fields share is written once."""
-    units = set(value.unit.split())
-    unit = value.unit if len(units) > 1 else next(iter(units), "")
-    return f"{number(value.value)} {unit}".rstrip()
+    """Format a value in the units of mission files, with the names of its components; a unit that all share is written once."""
+    if isinstance(value.value, (str, bool, np.bool_)):
+        return number(value.value)
+    array = np.asarray(value.value)
+    n = max(1, len(value.fields)) if array.ndim != 1 else len(array)
+    si = split_units(value.unit, n)
+    shown = (
+        split_units(value.mission_unit, n) if value.mission_unit else ["deg" if u == "rad" else u for u in si]
+    )
+    factors = np.array([float(unit_of(unit).factor) for unit in shown])
+    numbers = array if (factors == 1.0).all() else array / (factors if array.ndim else factors[0])
+    signs, names = [_sign(unit) for unit in shown], _component_names(value.fields)
+    is_alike, unit = len(set(signs)) == 1, signs[0]
+    if array.ndim != 1 or (not names and is_alike):
+        head = f" ({'  '.join(names)})" if names and array.ndim > 1 and len(array) else ""
+        return number(numbers[()]).replace(":", f"{head}:", 1) + (
+            unit if is_alike and (not array.ndim or len(array)) else ""
+        )
+    named = [f"{name}{NARROW}" for name in names] or [""] * n
+    parts = [
+        f"{name}{number(v)}{'' if is_alike else s}" for name, v, s in zip(named, numbers, signs, strict=True)
+    ]
+    return (
+        "  ".join(parts[:MOST_ITEMS]) + (f" … ({n})" if n > MOST_ITEMS else "") + (unit if is_alike else "")
+    )
+
+
+def _sign(unit: str) -> str:
+    """A unit as it stands behind a number: "°", " m/s"."""
+    return (
+        ""
+        if unit in ("", "1")
+        else unit.replace("deg", "°", 1)
+        if unit.startswith("deg")
+        else f"{NARROW}{unit}"
+    )
+
+
+def _component_names(fields: Sequence[str]) -> list[str]:
+    """Names of components without what all begin with: "velocity_x velocity_y" are "x y"."""
+    parts = [name.rpartition("_") for name in fields]
+    is_common = len({head for head, _, _ in parts}) == 1 and len(fields) > 1
+    return [tail if is_common else name for name, (_, _, tail) in zip(fields, parts, strict=True)]
 
 
 def _letter(letter: ShownMessage) -> Row:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tussle.errors import ParameterError
+from tussle.record.run_file import mission_entry
 from tussle.view.curves import numbers_of
 from tussle.view.frame import Event, Frame
 from tussle.view.live import Live
@@ -20,6 +21,7 @@ from tussle.view.page.chunks import FULL_HEALTH, UNIT, pack, step_of
 from tussle.view.page.commands import LARGEST_ID, WANTED, Command, game_commands, number, read_command, whole
 from tussle.view.page.document import event_rows
 from tussle.view.page.drawing import drawing_message
+from tussle.view.page.facts import mission_facts
 from tussle.view.page.failures import Failures
 from tussle.view.page.formatting import entity_sections, result_rows
 from tussle.view.page.packing import message
@@ -109,10 +111,18 @@ class FramePublisher:
 
     def document(self) -> dict[str, Any]:
         """Return the document of a live game."""
+        mission = self._live.simulation.mission
+        facts = [("Seed", str(self._live.seed)), *mission_facts(mission_entry(mission), self._live.teams)]
         return {
-            "source": "socket", "facts": [], "idShift": 0, "isComplete": True, "attitudeUnit": UNIT,
+            "source": "socket", "facts": facts, "endTime": mission.end if self._ends_by_time else None, "dt": mission.dt,
+            "idShift": 0, "isComplete": True, "attitudeUnit": UNIT,
             "healthSteps": FULL_HEALTH, "seed": min(self._live.seed, LARGEST_ID),
         }  # fmt: skip
+
+    @property
+    def _ends_by_time(self) -> bool:
+        mission = self._live.simulation.mission
+        return "time" in mission.end_conditions and math.isfinite(mission.end)
 
     @cached_property
     def _step(self) -> float:

@@ -11,12 +11,14 @@ from typing import Any
 
 import numpy as np
 
+from tussle import displays
 from tussle.errors import ParameterError, ViewError
 from tussle.mission import Mission
 from tussle.view.page.chunks import ANGLE_ERROR, FULL_HEALTH, UNIT, pack, position_error, step_of
 from tussle.view.page.compare import Comparison
 from tussle.view.page.document import event_rows, game_document, scenery_blobs
 from tussle.view.page.drawing import drawing_message
+from tussle.view.page.facts import mission_facts
 from tussle.view.page.packing import ints, message, reals
 from tussle.view.page.recorded_curves import column_changes, quantities_of, run_changes
 from tussle.view.recording import Recording
@@ -101,12 +103,12 @@ class RecordedData:
         facts += [
             (
                 "Frames",
-                grouped(len(self.kept))
-                + (f" of {grouped(len(game.t))}, one every {self._period:g} s" if self._period else ""),
+                f"{len(self.kept):,}"
+                + (f" of {len(game.t):,}, one every {self._period:g} s" if self._period else ""),
             ),
             (
                 "Entities",
-                f"{' and '.join(map(grouped, self.n_entities))}, in {grouped(int(self.counts.sum()))} states",
+                f"{' and '.join(f'{n:,}' for n in self.n_entities)}, in {int(self.counts.sum()):,} states",
             ),
         ]
         if isinstance(game, Comparison):
@@ -297,8 +299,9 @@ def game_facts(game: Recording | Comparison) -> list[tuple[str, str]]:
         settings = [(path, f"A {a}, B {b}") for path, a, b in game.differing]
         return settings + [(f"{name}: {key}", value) for name, run in both for key, value in game_facts(run)]
     info, t = game.run.info, game.t
+    names = {str(team): name for team, name in game.teams.items()}
     worlds = info.get("worlds", [])
-    facts = [("Run", game.path.resolve().name), ("Mission", game.name)]
+    facts = [("Run", game.path.resolve().name)]
     if game.world < len(worlds):
         world = worlds[game.world]
         facts.append(("Seed", str(world["seed"])))
@@ -306,18 +309,19 @@ def game_facts(game: Recording | Comparison) -> list[tuple[str, str]]:
             facts.append(("World", f"{game.world} of {len(worlds)}"))
         if world["scores"]:
             facts.append(
-                ("Score", ", ".join(f"team {team}: {score:g}" for team, score in world["scores"].items()))
+                (
+                    "Score",
+                    ", ".join(
+                        f"{names.get(str(team)) or f'team {team}'}: {displays.number(float(score))}"
+                        for team, score in world["scores"].items()
+                    ),
+                )
             )
     facts.append(("Time", f"{t[0]:g} s to {t[-1]:g} s"))
     if info:
-        facts.append(("Step", f"{game.dt:g} s"))
+        facts += mission_facts(info["mission"], game.teams)
         facts.append(("Played by", f"tussle {info.get('versions', {}).get('tussle', '')}".strip()))
     return facts
-
-
-def grouped(count: int) -> str:
-    """Format a count with narrow spaces between thousands, as the page's script does."""
-    return f"{count:,}".replace(",", "\u202f")
 
 
 def compact_json(data: object) -> str:

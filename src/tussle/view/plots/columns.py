@@ -124,7 +124,7 @@ def column_of_runs(recordings: Sequence[Recording], name: str, selection: Select
         signs = list(
             _run_lines(axes, t, means, teams, games)
             if len(games) <= len(COLOURS)
-            else _run_bands(axes, t, means, teams)
+            else _run_bands(axes, games[0], t, means, teams)
         )
         axes.set_ylabel(label)
         axes.margins(y=0.08)
@@ -158,8 +158,10 @@ def _run_lines(
             yield line_sign(INK, linestyle=DASHES[j % len(DASHES)]), teams[team]
 
 
-def _run_bands(axes: Any, t: np.ndarray, means: Any, teams: dict[int, str]) -> Iterator[Handle]:
+def _run_bands(
+    axes: Any, tracks: Trajectories, t: np.ndarray, means: Any, teams: dict[int, str]
+) -> Iterator[Handle]:
     for team, values in means.items():
-        draw_bands(axes, t, values, team)
-        yield line_sign(**line_look(team)), f"{teams[team]}, median"
+        draw_bands(axes, tracks, t, values, team)
+        yield line_sign(**line_look(tracks, team)), f"{teams[team]}, median"
     yield from band_signs("the runs", "them")

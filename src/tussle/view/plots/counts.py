@@ -8,7 +8,7 @@ import numpy as np
 
 from tussle.batch.report.drawing import rule_y
 from tussle.errors import ParameterError
-from tussle.palette import INK, MUTED, colour_of
+from tussle.palette import INK, MUTED
 from tussle.view.plots.selection import Trajectories
 from tussle.view.plots.sheet import Handle, add_head, line_look, line_sign, mark_sign, sheet, time_axis
 
@@ -33,8 +33,8 @@ def left(tracks: Trajectories) -> Figure:
     causes: set[str] = set()
     for number, name in tracks.teams.items():
         n = np.bincount(tracks.frame[team == number], minlength=n_frames)
-        axes.step(tracks.frame_times, n, where="post", **line_look(number))
-        signs.append((line_sign(**line_look(number)), f"{name}: {n[0]}, then {n[-1]}"))
+        axes.step(tracks.frame_times, n, where="post", **line_look(tracks, number))
+        signs.append((line_sign(**line_look(tracks, number)), f"{name}: {n[0]}, then {n[-1]}"))
         causes |= _mark_deaths(axes, tracks, number, n)
     _whole_numbers(axes)
     axes.set_ylabel("entities")
@@ -61,8 +61,10 @@ def captures(tracks: Trajectories) -> Figure:
     if caught:
         axes = panels.pop(0)
         for team, times in sorted(caught.items()):
-            _staircase(axes, tracks, times, **line_look(team))
-            signs.append((line_sign(**line_look(team)), f"{tracks.recording.teams[team]}: {len(times)}"))
+            _staircase(axes, tracks, times, **line_look(tracks, team))
+            signs.append(
+                (line_sign(**line_look(tracks, team)), f"{tracks.recording.teams[team]}: {len(times)}")
+            )
         axes.set_ylabel("captures so far")
         _whole_numbers(axes)
     if met:
@@ -132,7 +134,13 @@ def _mark_deaths(axes: Axes, tracks: Trajectories, team: int, n: np.ndarray) -> 
     for h in deaths:
         at = int(np.searchsorted(tracks.frame_times, h.t + 1e-6 * tracks.recording.dt, side="right")) - 1
         axes.plot(
-            h.t, n[at], causes[h.text], color=colour_of(team), markersize=3.8, markeredgewidth=0.9, zorder=3
+            h.t,
+            n[at],
+            causes[h.text],
+            color=tracks.colours[team],
+            markersize=3.8,
+            markeredgewidth=0.9,
+            zorder=3,
         )
     return {h.text for h in deaths}
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from tussle.batch.report.drawing import rule_y, shortened
 from tussle.errors import ParameterError
-from tussle.palette import INK, MUTED, PAPER, colour_of, mixed
+from tussle.palette import INK, MUTED, PAPER, mixed
 from tussle.palette import TEAM_COLOURS as COLOURS
 from tussle.view.plots.selection import Selection, Trajectories
 from tussle.view.plots.sheet import Handle, add_head, line_look, line_sign, mark_sign, sheet, time_axis
@@ -133,12 +133,13 @@ def _teams_over_time(axes: Axes, tracks: Trajectories, values: np.ndarray) -> li
         _band(axes, tracks, values, team)
     for who, team, rows in tracks.each():
         if team not in many:
-            _line(axes, tracks, values, rows, alpha=0.85, **line_look(team, 0.8))
-            _cross(axes, tracks, values, who, rows, colour_of(team))
-    signs = [(line_sign(**line_look(team)), name) for team, name in tracks.teams.items()]
+            _line(axes, tracks, values, rows, alpha=0.85, **line_look(tracks, team, 0.8))
+            _cross(axes, tracks, values, who, rows, tracks.colours[team])
+    signs = [(line_sign(**line_look(tracks, team)), name) for team, name in tracks.teams.items()]
     if many:
         signs += band_signs("a team", "it")
-    return signs + (_death_sign(tracks) if len(many) < len(count) else [])
+    is_marked = any(who in tracks.deaths and team not in many for who, team, _ in tracks.each())
+    return signs + (_death_sign(tracks) if is_marked else [])
 
 
 def _line(axes: Axes, tracks: Trajectories, values: np.ndarray, rows: slice, **options: Any) -> None:
@@ -169,7 +170,7 @@ def _band(axes: Axes, tracks: Trajectories, values: np.ndarray, team: int) -> No
     samples = np.full((int(np.diff(edges).max(initial=0)), len(frames)), np.nan)
     for i, (begin, end) in enumerate(pairwise(edges)):
         samples[: end - begin, i] = found[begin:end]
-    draw_bands(axes, tracks.frame_times[frames], samples, team)
+    draw_bands(axes, tracks, tracks.frame_times[frames], samples, team)
 
 
 def band_signs(of: str, it: str) -> list[Handle]:
@@ -178,12 +179,12 @@ def band_signs(of: str, it: str) -> list[Handle]:
     return [(line_sign(shades[0], 5.0), f"half of {of}"), (line_sign(shades[1], 5.0), f"90 % of {it}")]
 
 
-def draw_bands(axes: Axes, t: np.ndarray, samples: np.ndarray, team: int) -> None:
+def draw_bands(axes: Axes, tracks: Trajectories, t: np.ndarray, samples: np.ndarray, team: int) -> None:
     """Median, middle half and middle nine tenths of samples, (n, T), NaN where there is none, at times [s], (T,)."""
     bands = np.full((5, len(t)), np.nan)
     has_some = np.isfinite(samples).any(axis=0)
     bands[:, has_some] = np.nanquantile(samples[:, has_some], [0.05, 0.25, 0.5, 0.75, 0.95], axis=0)
-    colour = colour_of(team)
+    colour = tracks.colours[team]
     axes.fill_between(t, bands[0], bands[4], color=colour, alpha=0.16, linewidth=0)
     axes.fill_between(t, bands[1], bands[3], color=colour, alpha=0.3, linewidth=0)
-    axes.plot(t, bands[2], **line_look(team))
+    axes.plot(t, bands[2], **line_look(tracks, team))

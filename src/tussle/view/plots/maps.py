@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tussle.batch.report.drawing import WIDTH, marker_of
-from tussle.palette import INK, MUTED, PAPER, colour_of, mixed
+from tussle.palette import INK, MUTED, PAPER, mixed
 from tussle.view.plots.selection import Trajectories
 from tussle.view.plots.sheet import Handle, add_head, line_sign, mark_sign, sheet
 from tussle.view.scenery import round_up
@@ -26,6 +26,10 @@ N_CELLS = 1200
 """Cells across a plot; of consecutive points in one cell one is drawn. More than the pixels of a PNG file."""
 MAX_MAPS = 6
 """Teams with a map of their own."""
+_ZOOM = 1.08
+"""Size of a flat scene in space."""
+MAX_SIGNS = 4
+"""Marks of teams beside each other in a legend."""
 LEAST_WIDTH = 10.0
 """Least width of a map [m]."""
 
@@ -42,7 +46,7 @@ def trajectory(tracks: Trajectories) -> Figure:
     lines = _lines(tracks, pos, shown, float((high - low).max()) / N_CELLS)
     _draw_lines(axes, tracks, lines)
     marks = _draw_ends(axes, tracks, pos, shown)
-    add_head(figure, tracks, "Trajectories from above", [*_team_signs(tracks), *marks, *scenery])
+    add_head(figure, tracks, "Trajectories from above", [*_team_signs(tracks, lines), *marks, *scenery])
     return figure
 
 
@@ -65,9 +69,10 @@ def trajectory3d(tracks: Trajectories) -> Figure:
     sides = np.maximum(seen / seen.max(), 0.25)  # none so short that its numbers lie over each other
     _space_look(axes, sides)
     what = "Trajectories in space" if times == 1.0 else f"Trajectories in space, heights times {times:g}"
-    add_head(figure, tracks, what, [*_team_signs(tracks), *marks])
+    add_head(figure, tracks, what, [*_team_signs(tracks, lines), *marks])
     figure.set_layout_engine("none")  # it would make the scene small
     axes.set_position((0.0, 0.0, 0.98, 0.94))
+    _centre(figure, axes, sides)
     return figure
 
 
@@ -79,7 +84,7 @@ def density(tracks: Trajectories) -> Figure:
     edges = [_edges(low[i], high[i], step) for i in (0, 1)]
     lasts = _durations(tracks)[tracks.frame]
     team = np.repeat(tracks.team, np.diff(tracks.first))
-    parts = [(name, colour_of(number), team == number) for number, name in tracks.teams.items()]
+    parts = [(name, tracks.colours[number], team == number) for number, name in tracks.teams.items()]
     if len(parts) > MAX_MAPS:
         parts = [(f"all {len(parts)} teams", MUTED, np.ones(len(team), bool))]
     figure = sheet(height * len(parts))
@@ -88,7 +93,7 @@ def density(tracks: Trajectories) -> Figure:
         held = np.histogram2d(pos[rows, 0], pos[rows, 1], bins=edges, weights=lasts[rows])[0]
         _shade(figure, axes, held, edges, colour)
         _map_axes(axes, low, high)
-        axes.set_title(name, loc="left", fontsize=8.5, color=colour, pad=3.0)
+        axes.set_title(name, loc="left", fontsize=8.5, pad=3.0)
         axes.label_outer()
     add_head(figure, tracks, f"Time spent in cells of {step:g} m")
     return figure
@@ -158,14 +163,20 @@ def _draw_lines(axes: Any, tracks: Trajectories, by_team: list[tuple[int, list[n
         if not lines:
             continue
         drawn = kind(
-            lines, colors=colour_of(team), linewidths=_thinner(len(lines)), zorder=2.0 + 0.1 * order,
+            lines, colors=tracks.colours[team], linewidths=_thinner(len(lines)), zorder=2.0 + 0.1 * order,
             alpha=float(np.clip(4.0 / math.sqrt(len(lines)), 0.25, 1.0)), rasterized=n_points > MAX_POINTS,
         )  # fmt: skip
         axes.add_collection(drawn, autolim=False)
 
 
-def _team_signs(tracks: Trajectories) -> list[Handle]:
-    return [(line_sign(colour_of(team)), name) for team, name in tracks.teams.items()]
+def _team_signs(tracks: Trajectories, by_team: list[tuple[int, list[np.ndarray]]]) -> list[Handle]:
+    """A line for each team, or a square for one of which no line is drawn, since nobody of it moved."""
+    has_lines = {team for team, lines in by_team if any(np.ptp(line, axis=0).any() for line in lines)}
+    return [
+        (line_sign(colour) if team in has_lines else mark_sign("s", colour, markersize=5.0), name)
+        for team, name in tracks.teams.items()
+        for colour in (tracks.colours[team],)
+    ]
 
 
 def _thinner(n: int) -> float:
@@ -179,7 +190,7 @@ def _draw_ends(axes: Any, tracks: Trajectories, pos: np.ndarray, shown: np.ndarr
     small = float(np.clip(60.0 / math.sqrt(len(shown)), 0.8, 14.0))
     for team in tracks.teams:
         mine = shown[tracks.team[shown] == team]
-        colour, over = colour_of(team), {"zorder": 4.0, "rasterized": len(mine) > MAX_TRAJECTORIES // 4}
+        colour, over = tracks.colours[team], {"zorder": 4.0, "rasterized": len(mine) > MAX_TRAJECTORIES // 4}
         if axes.name == "3d":
             over["depthshade"] = False
         here = pos[tracks.first[mine]]
@@ -196,8 +207,11 @@ def _draw_ends(axes: Any, tracks: Trajectories, pos: np.ndarray, shown: np.ndarr
             *pos[tracks.last[dead]].T, s=1.6 * small, marker="x", color=colour,
             linewidths=min(0.9, 0.25 * small), **over,
         )  # fmt: skip
-    signs = [(mark_sign("o", markerfacecolor=PAPER, markersize=3.5), "first")]
-    signs.append((mark_sign("o", markersize=4.5), "last"))
+    signs: list[Handle] = [(mark_sign("o", markerfacecolor=PAPER, markersize=3.5), "first")]
+    alive_teams = np.unique(tracks.team[shown[~has_died[shown]]]).tolist()
+    if alive_teams:
+        markers = [mark_sign(marker_of(team), tracks.colours[team], markersize=4.5) for team in alive_teams]
+        signs.append((tuple(markers[:MAX_SIGNS]), "last"))
     if has_died[shown].any():
         signs.append((mark_sign("x", markersize=4.0), "died"))
     return signs
@@ -236,7 +250,7 @@ def _draw_scenery(axes: Axes, tracks: Trajectories) -> list[Handle]:
     for base in scenery.bases:
         place = np.array(base.position[:2])
         if _is_in_picture(place - base.radius, place + base.radius, corners):
-            colour = colour_of(base.team)
+            colour = tracks.colours[base.team]
             pale = mixed(colour, PAPER, 0.8)
             axes.add_patch(Circle((place[0], place[1]), base.radius, facecolor=pale, edgecolor=colour))
             signs["base"] = (mark_sign("o", MUTED, markersize=7.0, markerfacecolor="none"), "base")
@@ -265,7 +279,7 @@ def _space_look(axes: Any, sides: np.ndarray) -> None:
     """Set pane colours, a view from the south-east, and ticks that fit each axis."""
     from matplotlib.ticker import MaxNLocator
 
-    axes.set_box_aspect(sides.tolist(), zoom=1.08 - 0.3 * sides[2])  # as large as leaves room for the labels
+    axes.set_box_aspect(sides.tolist(), zoom=_ZOOM - 0.3 * sides[2])  # as large as leaves room for the labels
     axes.view_init(elev=26.0, azim=-58.0)
     axes.set(xlabel="east [m]", ylabel="north [m]", zlabel="up [m]")
     axes.zaxis.labelpad = -3.0
@@ -274,6 +288,22 @@ def _space_look(axes: Any, sides: np.ndarray) -> None:
         axis.line.set_linewidth(0.6)
         axis.set_major_locator(MaxNLocator(max(2, round(6 * side)), steps=[1, 2, 2.5, 5, 10]))
         axis.set_tick_params(labelsize=7, pad=0)
+
+
+def _centre(figure: Figure, axes: Any, sides: np.ndarray) -> None:
+    """Move a scene in space to the middle of its figure, and make it smaller until its labels lie on the figure."""
+    figure.draw_without_rendering()
+    room = np.array([figure.bbox.width, figure.legends[0].get_window_extent().y0])
+    for zoom in (_ZOOM - 0.3 * sides[2]) * 0.94 ** np.arange(12):
+        axes.set_box_aspect(sides.tolist(), zoom=zoom)
+        figure.draw_without_rendering()
+        boxes = [axis.get_tightbbox() for axis in (axes.xaxis, axes.yaxis, axes.zaxis)]
+        low, high = np.min([box.min for box in boxes], axis=0), np.max([box.max for box in boxes], axis=0)
+        place = axes.get_position()
+        shift = 0.5 * (room - low - high) / [figure.bbox.width, figure.bbox.height]
+        axes.set_position((place.x0 + shift[0], place.y0 + shift[1], place.width, place.height))
+        if (high - low <= 0.99 * room).all():
+            break
 
 
 def _edges(low: float, high: float, step: float) -> np.ndarray:

@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from tussle.errors import ParameterError, ViewError, listed
+from tussle.palette import hex_of, on_paper
 from tussle.view.frame import Event
 from tussle.view.recording import Recording
 
@@ -98,6 +99,13 @@ class Trajectories:
     def teams(self) -> dict[int, str]:
         """Number and name of the teams of these entities, ascending."""
         return {int(team): self.recording.teams[int(team)] for team in np.unique(self.team)}
+
+    @cached_property
+    def colours(self) -> dict[int, str]:
+        """Colour of each team of the recording, and of each that has a base."""
+        style, scenery = self.recording.style, self.recording.scenery
+        teams = {*self.recording.teams, *(base.team for base in scenery.bases)}
+        return {team: on_paper(hex_of(style.colour(team))) for team in teams}
 
     @cached_property
     def is_breaking(self) -> np.ndarray:

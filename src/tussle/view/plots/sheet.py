@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Sequence
 from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from rich.cells import cell_len
 
 from tussle.batch.report.drawing import (
     UNDATED,
     WIDTH,
     house_style,
     lettering,
+    printable,
     shortened,
 )
 from tussle.errors import ViewError
-from tussle.palette import MUTED, colour_of
+from tussle.palette import MUTED
 from tussle.view.plots.selection import Trajectories
 
 if TYPE_CHECKING:
@@ -34,6 +37,8 @@ DASHES: tuple[Any, ...] = ("-", (0, (5, 1.5)), (0, (5, 1.5, 1, 1.5)), (0, (1, 1.
 Handle = tuple[Any, str]
 """A legend handle and its label."""
 
+MAX_NAME, MAX_LINES = 1000, 4
+"""Letters of a name, and lines of a title."""
 LETTERS = 72
 """Letters in one line of the figure."""
 
@@ -63,30 +68,44 @@ def add_head(
     has_seed: bool = True,
 ) -> None:
     """Write title and legend over the axes; the figure grows by their lines."""
+    from matplotlib.legend_handler import HandlerTuple
+
     names = [shortened(name, 30) for _, name in handles]
     widths = [6 + len(name) for name in names]
     n_columns = max(1, len(names)) if sum(widths) <= LETTERS else max(1, LETTERS // max(widths))
-    figure.set_figheight(figure.get_figheight() + 0.2 + 0.17 * -(-len(names) // n_columns))
+    title = _wrapped(f"{what} · {_game(tracks, has_seed)}")
+    n_lines = title.count("\n") + -(-len(names) // n_columns)
+    figure.set_figheight(figure.get_figheight() + 0.2 + 0.17 * n_lines)
     legend = figure.legend(
         [handle for handle, _ in handles], names, loc="outside upper left", ncols=n_columns, borderaxespad=0.2,
-        title=f"{what} · {_game(tracks, LETTERS - 3 - len(what), has_seed)}", alignment="left", columnspacing=1.4,
+        title=title, alignment="left", columnspacing=1.4, handler_map={tuple: HandlerTuple(ndivide=None, pad=0.1)},
     )  # fmt: skip
     legend.get_title().set_color(MUTED)
     legend.get_title().set_fontsize(8)
 
 
-def _game(tracks: Trajectories, n_letters: int, has_seed: bool) -> str:
-    """Name, world and, unless it is of several runs, seed of the game, in so many letters."""
+def _game(tracks: Trajectories, has_seed: bool) -> str:
+    """Name, world and, unless it is of several runs, seed of the game."""
     recording = tracks.recording
     worlds = recording.run.info.get("worlds", ())
     seed = f", seed {worlds[recording.world]['seed']}" if has_seed and recording.world < len(worlds) else ""
     about = f", world {recording.world}{seed}" if len(worlds) > 1 else seed
-    return shortened(recording.name, max(8, n_letters - len(about))) + about
+    return printable(recording.name)[:MAX_NAME] + about
 
 
-def line_look(team: int, linewidth: float = 1.4) -> dict[str, Any]:
+def _wrapped(title: str) -> str:
+    """A title in as many lines as it needs; one of very many letters ends after some."""
+    wide = len(title) / max(1, cell_len(title))
+    return "\n".join(textwrap.wrap(title, max(8, int(LETTERS * wide)), max_lines=MAX_LINES, placeholder=" …"))
+
+
+def line_look(tracks: Trajectories, team: int, linewidth: float = 1.4) -> dict[str, Any]:
     """Line options of a team's curves."""
-    return {"color": colour_of(team), "linestyle": DASHES[(team - 1) % len(DASHES)], "linewidth": linewidth}
+    return {
+        "color": tracks.colours[team],
+        "linestyle": DASHES[(team - 1) % len(DASHES)],
+        "linewidth": linewidth,
+    }
 
 
 def line_sign(color: str, linewidth: float = 1.6, **options: Any) -> Any:

@@ -1,8 +1,8 @@
 // What can be done, by name: keys, buttons and settings come here.
-/** @import { Drawn } from './types' */
+/** @import { Block, Drawn } from './types' */
 /** @import { Player } from './player.js' */
 
-import { byId, field, say } from './formatting.js';
+import { byId, element, field, length, say } from './formatting.js';
 import { TRAIL_LENGTHS } from './trails.js';
 
 /** @param {Player} player @returns {Record<string, () => void>} */
@@ -93,7 +93,8 @@ export function actionsOf(player) {
     quantities: () => player.quantities.toggle(),
     help: dialog('help'),
     info: dialog('info'),
-    close: () => /** @type {HTMLDialogElement} */ (document.querySelector('dialog[open]')).close(),
+    // Escape may have closed it while a key is down on its button.
+    close: () => /** @type {HTMLDialogElement | null} */ (document.querySelector('dialog[open]'))?.close(),
     settings: () => { byId('settings').hidden = !byId('settings').hidden; },
   };
 }
@@ -128,8 +129,22 @@ export function listenToSettings(player) {
       if (name === 'trail') player.lookBack();
     });
   }
+  fillViews(player.page.blocks);
   listen('loop', 'change', ({ checked }) => { player.clock.isLooping = checked; });
   showSettings(player);
+}
+
+/** List what plugins see; cones are set by hand only where none says so. @param {Block[]} blocks */
+function fillViews(blocks) {
+  const lines = blocks.flatMap(({ name, views }) => views.map(({ plugin, azimuth, elevation, range }) => {
+    const angles = [azimuth, elevation].filter((angle) => angle !== null).map((angle) => `${Number(angle.toPrecision(4))}°`).join(' × ');
+    return `${name}, ${plugin}: ${angles}${range === null ? '' : `, ${length(range)}`}`;
+  }));
+  byId('views').hidden = !lines.length;
+  byId('views').replaceChildren(...lines.map((line) => element('li', '', line)));
+  if (!lines.length) return;
+  say(byId('cones-say'), 'Fields of view');
+  for (const node of /** @type {NodeListOf<HTMLElement>} */ (document.querySelectorAll('#settings .by-hand'))) node.hidden = true;
 }
 
 /** Bring the settings up to what keys have changed. @param {{ drawn: Drawn }} player */

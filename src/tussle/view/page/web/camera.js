@@ -122,7 +122,9 @@ export class Camera {
   step(seconds, isCalm) {
     const { now, goal } = this;
     const shareIn = (/** @type {number} */ haste) => (isCalm ? 1 : 1 - Math.exp(-seconds / haste));
-    const [share, turned] = [shareIn(HASTE[this.mode]), shareIn(HASTE.free)];
+    // An overview that has to become wider does so at once, lest entities leave it.
+    const isWidening = this.mode === 'overview' && goal.zoom > now.zoom;
+    const [share, turned] = [shareIn(isWidening ? HASTE.free : HASTE[this.mode]), shareIn(HASTE.free)];
     const gap = minus(goal.at, now.at);
     const isFar = norm(gap) > 2e-4 * this.distance || Math.abs(goal.yaw - now.yaw) + Math.abs(goal.pitch - now.pitch) > 2e-4 ||
       Math.abs(goal.zoom - now.zoom) > 2e-4;

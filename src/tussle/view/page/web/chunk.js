@@ -123,7 +123,7 @@ export class Moment {
       this.y[n] = north + step * (y[row] + share * (y[after] - y[row]));
       this.z[n] = up + step * (z[row] + share * (z[after] - z[row]));
       this.health[n] = chunk.health[row];
-      blend(this.quat, 4 * n, chunk.quat, 4 * row, 4 * after, share);
+      blend(this.quat, 4 * n, chunk.quat, 4 * row, chunk.quat, 4 * after, share);
       n++;
     }
     this.n = n;
@@ -160,14 +160,15 @@ export class Moment {
 
 /**
  * An attitude between two, of one of which the opposite sign may be meant.
- * @param {Float32Array} out @param {number} at @param {Float32Array} quat @param {number} a @param {number} b @param {number} share
+ * @param {Float32Array} out @param {number} at @param {Float32Array} from @param {number} a @param {Float32Array} to @param {number} b
+ * @param {number} share of the way
  */
-function blend(out, at, quat, a, b, share) {
-  const same = quat[a] * quat[b] + quat[a + 1] * quat[b + 1] + quat[a + 2] * quat[b + 2] + quat[a + 3] * quat[b + 3];
+export function blend(out, at, from, a, to, b, share) {
+  const same = from[a] * to[b] + from[a + 1] * to[b + 1] + from[a + 2] * to[b + 2] + from[a + 3] * to[b + 3];
   const far = same < 0 ? -share : share;
   let sum = 0;
   for (let k = 0; k < 4; k++) {
-    out[at + k] = (1 - share) * quat[a + k] + far * quat[b + k];
+    out[at + k] = (1 - share) * from[a + k] + far * to[b + k];
     sum += out[at + k] * out[at + k];
   }
   const size = 1 / Math.sqrt(sum || 1);

@@ -34,22 +34,22 @@ export class EventLine {
 
   /** Bring marks and ticker up to a time. @param {number} t */
   update(t) {
-    const { marked, start, end } = this.layer;
-    const isNew = this.drawnFor?.marked !== marked || this.drawnFor.start !== start || this.drawnFor.end !== end;
+    const { marked, start, horizon } = this.layer;
+    const isNew = this.drawnFor?.marked !== marked || this.drawnFor.start !== start || this.drawnFor.horizon !== horizon;
     if (isNew) this.draw();
     this.showTicker(t);
   }
 
   /** Pixel of a time, from the left of the canvas; the ends are where the slider's knob can be. @param {number} t */
   x(t) {
-    const { start, end } = this.layer;
-    return KNOB + (end > start ? ((t - start) / (end - start)) * (this.canvas.clientWidth - 2 * KNOB) : 0);
+    const { start, horizon } = this.layer;
+    return KNOB + (horizon > start ? ((t - start) / (horizon - start)) * (this.canvas.clientWidth - 2 * KNOB) : 0);
   }
 
   /** Draw all marks: as many as fall on two pixels are one mark, the higher the more they are. */
   draw() {
-    const { marked, start, end } = this.layer;
-    this.drawnFor = { marked, start, end };
+    const { marked, start, horizon } = this.layer;
+    this.drawnFor = { marked, start, horizon };
     const pen = cleared(this.canvas);
     const bins = new Map();
     for (const { t, kind } of marked) {

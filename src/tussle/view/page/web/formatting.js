@@ -3,10 +3,10 @@
 
 import { END_TEXTS, EVENT_TEXTS } from './event_texts.js';
 
-/** A number with so many decimals, with thin spaces between thousands. @param {number} value */
+/** A number with so many decimals, with commas between thousands, as in reports. @param {number} value */
 export function number(value, digits = 0) {
   const [whole, rest] = Math.abs(value).toFixed(digits).split('.');
-  const grouped = whole.replace(/\B(?=(\d{3})+$)/g, '\u202f');
+  const grouped = whole.replace(/\B(?=(\d{3})+$)/g, ',');
   return (value < 0 && Number(value.toFixed(digits)) !== 0 ? '−' : '') + grouped + (rest ? '.' + rest : '');
 }
 

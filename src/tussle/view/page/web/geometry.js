@@ -32,6 +32,19 @@ export function forward(q) {
   return [1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y)];
 }
 
+/** The rotation b, then a. @param {Vector} a quaternion @param {Vector} b quaternion */
+export function turned(a, b) {
+  const [v, u] = [[a[1], a[2], a[3]], [b[1], b[2], b[3]]];
+  return [a[0] * b[0] - dot(v, u), ...add(add(scaled(u, a[0]), scaled(v, b[0])), cross(v, u))];
+}
+
+/** A vector of a body in the world. @param {Vector} q quaternion @param {Vector} a */
+export function rotated(q, a) {
+  const v = [q[1], q[2], q[3]];
+  const twice = scaled(cross(v, a), 2);
+  return add(add(a, scaled(twice, q[0])), cross(v, twice));
+}
+
 /** Product of two matrices. @param {ArrayLike<number>} a @param {ArrayLike<number>} b */
 function product(a, b) {
   return Float64Array.from({ length: 16 }, (_, i) => [0, 1, 2, 3].reduce((sum, k) => sum + a[4 * k + (i % 4)] * b[(i & 12) + k], 0));

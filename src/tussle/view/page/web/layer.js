@@ -34,6 +34,16 @@ export class Layer {
     this.leap = 0.25 * norm(minus(page.scenery.high, page.scenery.low));
   }
 
+  /** Whether what is shown stays as it is until something new comes. */
+  get isSettled() {
+    return true;
+  }
+
+  /** Time at which the time line ends: of a game that is played, when its mission ends it. */
+  get horizon() {
+    return this.end;
+  }
+
   /** Take events, without the deaths that a capture or a collision tells of. @param {EventRow[]} rows */
   setEvents(rows) {
     const all = rows.map(([t, kind, id, other, text]) => ({ t, kind, id, other, text }));

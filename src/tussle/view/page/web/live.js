@@ -2,6 +2,7 @@
 /** @import { Change, EventRow, PageData, Sample, Section, Status } from './types' */
 
 import { Chunk, Moment } from './chunk.js';
+import { Approach, fillBetween } from './interpolation.js';
 import { Layer } from './layer.js';
 import { lastWhere } from './ordered.js';
 
@@ -19,21 +20,38 @@ export class Live extends Layer {
     this.epoch = -1;
     /** @type {Moment[]} */
     this.past = [];
+    /** The newest state; `shown` approaches it. */
+    this.newest = this.shown;
+    this.approach = new Approach();
+    this.between = new Moment();
   }
 
   get mostAtOnce() {
-    return this.shown.n;
+    return this.newest.n;
+  }
+
+  get isSettled() {
+    return this.shown === this.newest;
+  }
+
+  /** When the mission ends the game, as long as it is not over before. */
+  get horizon() {
+    return this.status?.isOver ? this.end : Math.max(this.end, this.page.endTime ?? this.end);
   }
 
   /** Take the newest frame. @param {{ epoch: number }} header @param {Uint8Array} bytes */
   takeFrame({ epoch }, bytes) {
     const chunk = new Chunk(bytes, this.page);
+    const isJump = epoch !== this.epoch || Boolean(this.status?.isPaused);
     if (epoch !== this.epoch) this.past = [];
     this.epoch = epoch;
     this.meet(chunk);
-    this.shown = new Moment(chunk.nTracks).fill(chunk, 0);
-    this.end = Math.max(this.end, this.shown.t);
-    if (!(this.past[this.past.length - 1]?.t >= this.shown.t)) this.keep([...this.past, this.shown]);
+    const newest = new Moment(chunk.nTracks).fill(chunk, 0);
+    this.newest = newest;
+    this.end = Math.max(this.end, newest.t);
+    if (!(this.past[this.past.length - 1]?.t >= newest.t)) this.keep([...this.past, newest]);
+    this.approach.take(newest.t, performance.now() / 1000, isJump);
+    this.show();
     this.changed();
   }
 
@@ -65,7 +83,7 @@ export class Live extends Layer {
   takeStatus(status) {
     this.status = status;
     this.start = status.span[0];
-    this.end = Math.max(status.span[1], this.shown.t || 0);
+    this.end = Math.max(status.span[1], this.newest.t || 0);
     const { from, rows } = status.events;
     if (rows.length || from < this.rows.length) {
       this.rows = [...this.rows.slice(0, from), ...rows];
@@ -80,8 +98,18 @@ export class Live extends Layer {
     return entity?.id === id ? entity.sections.slice(1) : [];
   }
 
+  /** Move what is shown on towards the newest state. @param {number} seconds */
+  advance(seconds) {
+    if (this.approach.advance(seconds)) this.changed();
+  }
+
+  /** Set `shown` to where the approach is, between states on the straight way; false while there is no state. */
   show() {
-    return !Number.isNaN(this.shown.t);
+    const { newest, past, approach: { t } } = this;
+    const i = lastWhere(past.length, (k) => past[k].t <= t);
+    const after = past[i + 1];
+    this.shown = t === newest.t || i < 0 || !after ? newest : past[i].t === t ? past[i] : fillBetween(this.between, past[i], after, t, this.leap);
+    return !Number.isNaN(newest.t);
   }
 
   lookAhead() {}

@@ -19,11 +19,13 @@ function publish(player) {
     get t() { return player.clock.t; },
     get frame() { return layer.shown.frame; },
     /** Whether the page shows what is true now, and nothing moves by itself. */
-    get isDrawn() { return !player.isChanged && player.drawnTime === player.clock.t; },
+    get isDrawn() { return !player.isChanged && layer.isSettled && player.drawnTime === player.clock.t; },
     get nFrames() { return page.nFrames; },
     get isPlaying() { return player.clock.isPlaying; },
     get speed() { return player.clock.speed; },
     get chosen() { return player.chosen; },
+    /** Frames that have been drawn. */
+    get nDrawn() { return player.nDrawn; },
     get mode() { return camera.mode; },
     get camera() {
       const { target, distance, now, heading } = camera;

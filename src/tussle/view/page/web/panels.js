@@ -86,6 +86,9 @@ export class Panels {
     this.showNotes([...new Set([...(error ? [error] : []), ...this.page.notes, ...notes])]);
     if (error) this.notice(error, true);
     fillList(byId('metrics'), metrics);
+    // It begins anew with another seed.
+    const facts = /** @type {[string, string][]} */ (this.page.facts.map(([name, value]) => [name, name === 'Seed' ? `${seed}` : value]));
+    fillList(document.querySelector('#info dl'), facts);
   }
 
   /**
@@ -220,7 +223,7 @@ export class Panels {
     const { teamShift } = page.runs?.find(({ teams }) => teams.includes(team.id)) || { teamShift: 0 };
     const nCaptures = layer.events.filter((event) => event.kind === 'capture' && event.id === id && event.t <= t).length;
     return [
-      ['Team', `${team.id - teamShift} ${team.name}`.trim()],
+      ['Team', team.name || `team ${team.id - teamShift}`],
       ...(slot >= 0 ? this.stateOf(slot) : [this.absence(id, t)]),
       .../** @type {[string, string][]} */ (nCaptures ? [['Captures', `${nCaptures}`]] : []),
     ];

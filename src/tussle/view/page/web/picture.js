@@ -167,7 +167,8 @@ export class Picture {
     for (const { name, colour, end } of drawn.grid ? scenery.ends : []) overlay.writeAt(view, end, name, overlay.soft(colour), 11, { gap: 3 });
     for (const [text, place] of this.player.page.signs || []) overlay.writeAt(view, place, text, overlay.ink, 16, { must: true, gap: 0 });
     const { spacing, nearer } = scenery.cell(view);
-    say(byId('scale'), drawn.grid ? `grid ${length(nearer > 0.4 ? spacing : 10 * spacing)}` : '');
+    const where = scenery.data.hasGround ? '' : ', no ground';
+    say(byId('scale'), drawn.grid ? `grid ${length(nearer > 0.4 ? spacing : 10 * spacing)}${where}` : '');
   }
 
   /** Hand the picture, without the panels, to the reader as a PNG file. */

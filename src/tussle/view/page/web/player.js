@@ -51,12 +51,13 @@ export class Player {
     /** @type {number | undefined} */
     this.looking = undefined;
     this.drawnTime = NaN;
+    this.nDrawn = 0;
     /** Shapes of a recording that are drawn. @type {ReturnType<Recorded['shapesShown']>} */
     this.shapes = null;
     /** @type {Drawn} */
     this.drawn = {
       scale: 0, trail: 0, text: 0, labels: false, wire: false, least: true, grid: true, regions: true, shapes: true, rings: false,
-      cones: false, links: false, ringRadius: reach, coneRange: reach, coneAngle: Math.round(page.angle) || 60, linkRange: reach,
+      cones: false, links: false, ringRadius: reach, coneRange: reach, coneAngle: 60, linkRange: reach,
     };
     this.isCalm = window.matchMedia('(prefers-reduced-motion: reduce)').matches;
     const failed = (/** @type {Error} */ error) => sorry(`The data of this page is missing or damaged: ${error.message}`);
@@ -105,10 +106,10 @@ export class Player {
         },
         frame: (header, bytes) => {
           const isJump = header.epoch !== layer.epoch && layer.epoch >= 0;
-          const before = layer.shown.t;
+          const before = layer.newest.t;
           layer.takeFrame(header, bytes);
           // Of a game that is faster than frames are sent, most of a trail is not seen.
-          const isSparse = layer.shown.t - before > 0.1 * TRAIL_LENGTHS[this.drawn.trail];
+          const isSparse = layer.newest.t - before > 0.1 * TRAIL_LENGTHS[this.drawn.trail];
           if (isJump) this.lookBack();
           else if (isSparse) this.lookBackSoon();
           resolve();
@@ -194,9 +195,9 @@ export class Player {
     const seconds = Math.min((now - this.last) / 1000, 1);
     this.last = now;
     // Time waits for what has to be unpacked.
-    if (this.clock.isPlaying && this.isShown) {
+    if (this.isShown) {
+      if (this.clock.isPlaying && !this.source.isLive) this.look();
       this.clock.advance(seconds);
-      if (!this.source.isLive) this.look();
     }
     this.isShown = this.layer.show(this.clock.t);
     if (this.isShown) {
@@ -220,6 +221,7 @@ export class Player {
 
   draw() {
     const { clock, layer } = this;
+    this.nDrawn++;
     this.drawTimes.push(performance.now());
     const shapes = layer instanceof Recorded ? layer.shapesShown() : null;
     if (shapes && shapes !== this.shapes) {

@@ -1,10 +1,10 @@
 // How far entities reach: rings, cones, and links between those in reach of each other.
-/** @import { Drawn, View } from './types' */
+/** @import { Drawn, FieldOfView, View } from './types' */
 
-import { minus } from './geometry.js';
+import { add, between, minus, rotated, turned } from './geometry.js';
 import { Layer } from './layer.js';
 import { circle, Lines } from './lines.js';
-import { Model } from './models.js';
+import { LEVEL, Model } from './models.js';
 import { Renderer } from './renderer.js';
 
 /** Lines between entities; of more, the shortest are drawn. */
@@ -19,7 +19,9 @@ export class Reach {
     this.renderer = renderer;
     this.layer = layer;
     this.lines = new Lines(renderer);
-    this.angle = 0;
+    this.links = new Lines(renderer);
+    /** Angles -> their model. @type {Map<string, Model>} */
+    this.cones = new Map();
   }
 
   /** @param {View} view @param {number[]} slots @param {Drawn} drawn */
@@ -31,25 +33,55 @@ export class Reach {
       const colour = layer.colourOf(slot);
       circle(shown.placeIn(slot), drawn.ringRadius, SIDES).forEach((place, i) => lines.add(place, 0, colour, i < SIDES));
     }
-    for (const [a, b] of drawn.links ? pairsWithin(slots.map((slot) => shown.placeIn(slot)), drawn.linkRange) : []) lines.segment(a, b, [90, 160, 190]);
     lines.upload();
     lines.draw(view, 1.2, 0.75);
+    const links = drawn.links ? pairsWithin(slots.map((slot) => shown.placeIn(slot)), drawn.linkRange) : [];
+    this.links.begin(view.anchor);
+    for (const [a, b] of links) this.links.segment(a, b, [90, 160, 190]);
+    this.links.upload();
+    this.links.draw(view, 1, linkOpacity(links.length));
     if (drawn.cones) this.drawCones(view, slots, drawn);
   }
 
-  /** @param {View} view @param {number[]} slots @param {Drawn} drawn */
+  /** Draw what plugins see, or cones by the settings where no plugin says so. @param {View} view @param {number[]} slots @param {Drawn} drawn */
   drawCones(view, slots, { coneAngle, coneRange }) {
-    if (this.angle !== coneAngle) this.cone = new Model(this.renderer, coneMesh((coneAngle * Math.PI) / 180));
-    this.angle = coneAngle;
-    this.cone.n = 0;
+    const { shown } = this.layer;
+    const { blocks } = this.layer.page;
+    /** @type {FieldOfView[]} */
+    const byHand = [{ plugin: '', azimuth: coneAngle, elevation: null, range: coneRange, pos: [0, 0, 0], quat: LEVEL }];
+    const isByHand = !blocks.some(({ views }) => views.length);
+    for (const model of this.cones.values()) model.n = 0;
     for (const slot of slots) {
-      const [x, y, z] = minus(this.layer.placeIn(slot), view.anchor);
-      this.cone.add(x, y, z, this.layer.shown.quat, 4 * slot, this.layer.colourOf(slot), coneRange);
+      const own = shown.quat.subarray(4 * slot, 4 * slot + 4);
+      for (const { azimuth, elevation, range, pos, quat } of isByHand ? byHand : blocks[shown.block[slot]].views) {
+        const [x, y, z] = add(minus(this.layer.placeIn(slot), view.anchor), rotated(own, pos));
+        this.cone(azimuth, elevation).add(x, y, z, turned(own, quat), 0, this.layer.colourOf(slot), range ?? coneRange);
+      }
     }
-    this.cone.upload();
-    this.cone.draw(view, { opacity: 0.13, flatness: 0.6 });
+    for (const model of this.cones.values()) {
+      model.upload();
+      model.draw(view, { opacity: coneOpacity(slots.length), flatness: 0.6 });
+    }
+  }
+
+  /** The model for angles [degrees]. @param {number} azimuth @param {number | null} elevation */
+  cone(azimuth, elevation) {
+    const key = `${azimuth} ${elevation}`;
+    let found = this.cones.get(key);
+    if (!found) {
+      const [wide, tall] = [azimuth, elevation].map((angle) => (angle === null ? null : (angle * Math.PI) / 180));
+      found = new Model(this.renderer, tall === null ? coneMesh(wide) : sectorMesh(wide, tall));
+      this.cones.set(key, found);
+    }
+    return found;
   }
 }
+
+/** Opacity of so many links: what lies behind is seen through many as well as through few. @param {number} n */
+export const linkOpacity = (n) => between(4 / Math.sqrt(n || 1), 0.1, 0.45);
+
+/** Opacity of so many cones. @param {number} n */
+export const coneOpacity = (n) => between(0.25 / Math.sqrt(n || 1), 0.012, 0.13);
 
 /** Pairs of places that are no farther apart than a reach [m], at most MOST_LINKS. @param {number[][]} places @param {number} reach */
 export function pairsWithin(places, reach) {
@@ -90,5 +122,28 @@ function coneMesh(angle) {
     faces.push(0, at(0, i + 1), at(0, i), at(rings - 1, i), at(rings - 1, i + 1), tip);
     for (let r = 0; r + 1 < rings; r++) faces.push(at(r, i), at(r, i + 1), at(r + 1, i + 1), at(r, i), at(r + 1, i + 1), at(r + 1, i));
   }
+  return { vertices, faces };
+}
+
+/** What lies within 1 m of the origin and half the angles to the sides and up and down: its skin. @param {number} wide radians @param {number} tall radians */
+export function sectorMesh(wide, tall) {
+  const [across, up] = [Math.min(wide / 2, Math.PI), Math.min(tall / 2, Math.PI / 2)];
+  const nAcross = Math.max(1, Math.ceil(across / 0.1));
+  const nUp = Math.max(1, Math.ceil(up / 0.1));
+  const vertices = [0, 0, 0];
+  for (let j = 0; j <= nUp; j++) {
+    const rise = up * ((2 * j) / nUp - 1);
+    for (let i = 0; i <= nAcross; i++) {
+      const turn = across * ((2 * i) / nAcross - 1);
+      vertices.push(Math.cos(rise) * Math.cos(turn), Math.cos(rise) * Math.sin(turn), Math.sin(rise));
+    }
+  }
+  const at = (/** @type {number} */ i, /** @type {number} */ j) => 1 + j * (nAcross + 1) + i;
+  const faces = [];
+  for (let j = 0; j < nUp; j++) {
+    for (let i = 0; i < nAcross; i++) faces.push(at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j), at(i + 1, j + 1), at(i, j + 1));
+    if (across < Math.PI) faces.push(0, at(0, j), at(0, j + 1), 0, at(nAcross, j + 1), at(nAcross, j));
+  }
+  for (let i = 0; up < Math.PI / 2 && i < nAcross; i++) faces.push(0, at(i + 1, 0), at(i, 0), 0, at(i, nUp), at(i + 1, nUp));
   return { vertices, faces };
 }

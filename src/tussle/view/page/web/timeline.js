@@ -9,8 +9,6 @@ import { Live } from './live.js';
 import { Recorded } from './recorded.js';
 
 const SPEEDS = [0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100, 1000];
-/** Decimals of a live game's times, whose step is not known. */
-const LIVE_DECIMALS = 2;
 
 /** What both clocks have in common; `t`, `isPlaying` and `speed` are their own. */
 export class Clock {
@@ -18,7 +16,7 @@ export class Clock {
   constructor(layer) {
     this.layer = layer;
     this.slider = field('time');
-    this.decimals = LIVE_DECIMALS;
+    this.decimals = 2;
     this.isLooping = false;
     this.fitSlider();
   }
@@ -26,19 +24,21 @@ export class Clock {
   /** Let the slider reach as far as the game. */
   fitSlider() {
     this.slider.min = String(this.layer.start);
-    this.slider.max = String(this.layer.end);
+    this.slider.max = String(this.layer.horizon);
   }
 
   /** @param {number} t @param {boolean} isPlaying @param {number} speed */
   show(t, isPlaying, speed) {
     const { slider, decimals } = this;
-    const { start, end } = this.layer;
+    const { start, end, horizon } = this.layer;
+    const share = (/** @type {number} */ time) => `${horizon > start ? (100 * (time - start)) / (horizon - start) : 0}%`;
     this.fitSlider();
     if (document.activeElement !== slider || isPlaying) slider.value = String(t);
-    slider.style.setProperty('--done', `${end > start ? (100 * (t - start)) / (end - start) : 0}%`);
+    slider.style.setProperty('--done', share(t));
+    slider.style.setProperty('--known', share(end));
     slider.setAttribute('aria-valuetext', `${t.toFixed(decimals)} seconds`);
     say(document.querySelector('#clock b'), t.toFixed(decimals));
-    say(document.querySelector('#clock span'), `/ ${end.toFixed(decimals)} s`);
+    say(document.querySelector('#clock span'), `/ ${horizon.toFixed(decimals)} s`);
     byId('play').classList.toggle('is-playing', isPlaying);
     byId('play').setAttribute('aria-label', isPlaying ? 'Pause' : 'Play');
     say(byId('speed'), times(speed));
@@ -108,6 +108,7 @@ export class LiveClock extends Clock {
     super(layer);
     this.layer = layer;
     this.source = source;
+    this.decimals = decimalsOf(layer.page.dt);
   }
 
   get t() {
@@ -123,7 +124,10 @@ export class LiveClock extends Clock {
     return this.layer.status.warp ?? Infinity;
   }
 
-  advance() {}
+  /** @param {number} seconds */
+  advance(seconds) {
+    this.layer.advance(seconds);
+  }
 
   play() {
     this.source.send('resume');
@@ -135,7 +139,8 @@ export class LiveClock extends Clock {
 
   /** @param {number} t */
   seek(t) {
-    this.source.send('seek', { t: between(t, this.layer.start, this.layer.end) });
+    // To the end is to what has been played; a place of the slider may be played first.
+    this.source.send('seek', { t: between(t, this.layer.start, t === Infinity ? this.layer.end : this.layer.horizon) });
   }
 
   /** @param {number} n */

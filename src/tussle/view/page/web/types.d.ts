@@ -6,7 +6,9 @@ export type Colour = ArrayLike<number>;
 /** Numbers of the corners of triangles, and the corners. */
 export interface Mesh { vertices: number[]; faces: number[]; }
 export interface Team { id: number; name: string; colour: number[]; }
-export interface Block { name: string; team: number; colour: number[]; model: string; lengths: number[]; }
+export interface Block { name: string; team: number; colour: number[]; model: string; lengths: number[]; views: FieldOfView[]; }
+/** What a plugin sees: full angles [degrees], of a cone where there is no elevation; range [m], or none; place and attitude on the body. */
+export interface FieldOfView { plugin: string; azimuth: number; elevation: number | null; range: number | null; pos: number[]; quat: number[]; }
 /** A column of plugins that was recorded: a component per field, or one without fields. */
 export interface Column { name: string; kind: 'float' | 'int' | 'bool'; fields: string[]; units: string[]; doc: string; }
 /** Title, and names, values and descriptions. */
@@ -18,7 +20,7 @@ export type EventRow = [t: number, kind: string, id: number, other: number, text
 
 export interface Terrain { x: number[]; y: number[]; low: number; step: number; hasTexture: boolean; }
 export interface SceneryData {
-  low: number[]; high: number[]; ground: number; gridStep: number; originLength: number; background: number[] | null;
+  low: number[]; high: number[]; ground: number; hasGround: boolean; gridStep: number; originLength: number; background: number[] | null;
   bases: { team: number; pos: number[]; radius: number; opacity: number }[];
   regions: { name: string; team: number | null; isWall: boolean; mesh: Mesh; outline: number[]; nParts: number }[];
   terrain: Terrain | null;
@@ -28,14 +30,14 @@ export interface SceneryData {
 export interface PageData {
   source: 'embedded' | 'range' | 'socket'; generator: string; title: string; blocks: Block[]; teams: Team[]; models: Record<string, Mesh>;
   scenery: SceneryData; opening: { position: number[] | null; target: number[] | null; mode: Mode; follow: number } | null;
-  reach: number; angle: number; scale: number; hasTrails: boolean; notes: string[]; facts: [string, string][]; idShift: number;
+  reach: number; scale: number; hasTrails: boolean; notes: string[]; facts: [string, string][]; idShift: number;
   isComplete: boolean; attitudeUnit: number; healthSteps: number;
   // Of a recorded run.
   nFrames?: number; nStates?: number; nEntities?: number[]; mostAtOnce?: number; chunks?: [number, number][]; positionError?: number;
   angleError?: number; begins?: number; runs?: { name: string; title: string; teams: number[]; teamShift: number }[]; shift?: Vector; signs?: [string, Vector][]; differing?: [string, string, string][]; quantities?: [string, string][];
   warp?: number | null; isPlaying?: boolean; lead?: string; shapeFrames?: number; columns?: Column[];
   // Of a live game.
-  seed?: number;
+  seed?: number; endTime?: number | null; dt?: number;
 }
 
 /** State of a live game, sent four times a second. */

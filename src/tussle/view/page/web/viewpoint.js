@@ -6,6 +6,12 @@ import { byId } from './formatting.js';
 import { between, forward, halfTurn } from './geometry.js';
 import { FIRST_PITCH, FIRST_YAW, STEEPEST } from './camera.js';
 
+/** Between entities and panels [pixels]. */
+const MARGIN = 22;
+
+/** Share of the view that is free. @param {{ left: number, right: number, top: number, bottom: number }} room */
+const freeShare = ({ left, right, top, bottom }) => Math.max(0, 1 - left - right) * Math.max(0, 1 - top - bottom);
+
 export class Viewpoint {
   /** @param {Player} player */
   constructor(player) {
@@ -60,13 +66,18 @@ export class Viewpoint {
     }, canvas.width / canvas.height, this.room());
   }
 
-  /** Shares of the view that panels cover. */
+  /** Shares of the view that panels cover, or are to be kept free beside them: below the panels at the top, or between them. */
   room() {
     const { clientWidth: width, clientHeight: height } = this.player.canvas;
-    const bottom = Math.min(0.4, (byId('bar').offsetHeight + 24) / height);
-    if (width <= 720) return { left: 0.06, right: 0.06, top: Math.min(0.25, 130 / height), bottom };
-    // Panels stand in the upper right corner only: half their width is enough.
-    return { left: 0.05, right: Math.min(0.15, 145 / width), top: 0.1, bottom };
+    const [head, right, bar] = ['head', 'right', 'bar'].map((id) => byId(id).getBoundingClientRect());
+    const beside = Math.max(0, width - right.left);
+    const shares = (/** @type {number} */ top, /** @type {number} */ onRight) => ({
+      left: Math.max(0.05, MARGIN / width), right: Math.max(0.05, (onRight + MARGIN) / width),
+      top: (top + MARGIN) / height, bottom: (height - bar.top + MARGIN) / height,
+    });
+    const [best] = [shares(Math.max(head.bottom, right.bottom), 0), shares(head.bottom, beside)].sort((a, b) => freeShare(b) - freeShare(a));
+    // Where panels cover nearly all, something is seen behind them.
+    return freeShare(best) > 0.02 ? best : { ...best, top: Math.min(best.top, 0.3), bottom: Math.min(best.bottom, 0.4) };
   }
 
   /** Let the camera be of a mode. Following begins near whom it follows. @param {Mode} mode */

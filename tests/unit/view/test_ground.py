@@ -1,0 +1,49 @@
+"""Where a shipped mission or an example has a ground, nobody is below it; where it has none, the page says so."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tussle import Simulation, stock
+from tussle.mission import Mission, read_mission, shipped_missions
+from tussle.scene import Scene
+from tussle.shapes import FlatGround
+from tussle.view import scenery_of
+
+SOURCES = {**{name: path for name, (path, _) in shipped_missions().items()}, **stock.examples()}
+SECONDS, MOST = 30.0, 20
+"""Simulated time, and entities of a block."""
+LEAST_RADIUS = 0.5
+"""An entity on the ground may lie half in it [m]."""
+
+
+def is_grounded(mission: Mission) -> bool:
+    """Its scene or plugins say where the ground is, and it needs no other program."""
+    return scenery_of(mission).has_ground and all(plugin.grade != "external" for plugin in mission.plugins)
+
+
+GROUNDED = [name for name, path in SOURCES.items() if is_grounded(read_mission(path).mission)]
+
+
+def test_missions_with_a_ground_are_known():
+    assert {"car_maze", "fixed_wing_6dof", "urban_quadrotors", "GroundCollision"} <= set(GROUNDED)
+    assert not {"predator_prey", "underwater_survey", "Boids"} & set(GROUNDED)
+
+
+@pytest.mark.parametrize("name", GROUNDED)
+def test_nobody_sinks_below_the_ground(name):
+    loaded = read_mission(SOURCES[name])
+    mission = loaded.mission
+    blocks = [block.replace(count=min(block.count, MOST)) for block in mission.blocks]
+    with Simulation(mission.replace(blocks=blocks), loaded.seed) as simulation:
+        scene = simulation.state.context.scene
+        levels = [
+            p.values["ground_collision_z"] for p in mission.interactions if "ground_collision_z" in p.values
+        ]
+        ground = Scene(ground=scene.ground or FlatGround(max(levels, default=-1e6)), terrain=scene.terrain)
+        for _ in range(round(min(mission.end - mission.start, SECONDS) / mission.dt / 10)):
+            simulation.step(10)
+            bodies = simulation.state.population.bodies
+            height = bodies.pos[2] - ground.height(*bodies.pos[:2])
+            assert (height >= -np.maximum(bodies.radius, LEAST_RADIUS)).all()
