@@ -32,6 +32,7 @@ from tussle.batch.statistics import (
     Share,
     mean_of,
     means_of,
+    numbered,
     paired_difference,
     share_of,
 )
@@ -388,9 +389,9 @@ class Results:
         strata = np.tile(np.arange(len(firsts)), len(matrix)) if len(firsts) > 1 else None
         is_by_seed = len(firsts) > 1 and not self.info["independent"]
         if is_by_seed:
-            blocks = np.repeat(_numbered(games), len(firsts))
+            blocks = np.repeat(numbered(games), len(firsts))
         elif self._has_copies:
-            blocks = _numbered(np.stack([games[:, firsts].ravel(), games[:, seconds].ravel()], axis=1))
+            blocks = numbered(np.stack([games[:, firsts].ravel(), games[:, seconds].ravel()], axis=1))
         names = (str(a), str(b))
         if is_number(a) or is_number(b):
             names = (self.label(firsts[0]), self.label(seconds[0]))
@@ -413,7 +414,7 @@ class Results:
         Args:
             points: These.
         """
-        return np.asarray(_numbered(self._games_by_seed[:, list(points)])[self._seed_index])
+        return np.asarray(numbered(self._games_by_seed[:, list(points)])[self._seed_index])
 
     @property
     def _has_copies(self) -> bool:
@@ -591,15 +592,6 @@ class Results:
 
     def _repr_html_(self) -> str:
         finite = ((name, values[np.isfinite(values)]) for name, values in self._columns.items())
-        rows = (
-            (self.title(name), float(v.mean()), float(v.min()), float(v.max()))
-            for name, v in finite
-            if len(v)
-        )
+        rows = ((self.title(name), *map(float, (v.mean(), v.min(), v.max()))) for name, v in finite if len(v))
         title = "Results in memory" if self.path is None else f"Results {self.path}"
         return page(title, self._facts(), table(("quantity", "mean", "minimum", "maximum"), rows))
-
-
-def _numbered(rows: np.ndarray) -> np.ndarray:
-    """A number for each row, (n,), the same for equal rows."""
-    return np.asarray(np.unique(rows, axis=0, return_inverse=True)[1]).ravel()

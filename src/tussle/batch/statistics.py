@@ -442,3 +442,8 @@ def paired_difference(
         n_greater, n_less, len(more) - n_greater - n_less,
         sign_test(int((signs > 0.0).sum()), int((signs < 0.0).sum())),
     )  # fmt: skip
+
+
+def numbered(rows: np.ndarray) -> np.ndarray:
+    """A number for each row, (n,), the same for equal rows."""
+    return np.asarray(np.unique(rows, axis=0, return_inverse=True)[1]).ravel()
