@@ -8,7 +8,7 @@ from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from tussle.batch.target import ChoiceAnswer, Answers
+from tussle.batch.target import Answers, ChoiceAnswer
 from tussle.batch.variables import Range, Variable
 from tussle.mission.codecs import written
 
