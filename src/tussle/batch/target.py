@@ -130,9 +130,12 @@ class Crossing:
 
     @property
     def text(self) -> str:
-        """The value with its interval: "13.4 (12.9 to 14.1)"."""
-        high = f"{self.high:.3g}" if math.isfinite(self.high) else "beyond"
-        return f"{self.value:.3g} ({self.low:.3g} to {high})"
+        """The value with its interval, to the digits that the interval allows: "13.4 (12.9 to 14.1)"."""
+        if not self.high > self.low:
+            return f"{self.value:.3g} ({self.low:.3g} or more)"
+        digits = max(-math.floor(math.log10(self.high - self.low)), 0)
+        value, low, high = (f"{number:,.{digits}f}" for number in (self.value, self.low, self.high))
+        return f"{value} ({low} to {high})"
 
 
 def crossing_of(response: Response, target: Target, over: str, choice: Mapping[str, Any]) -> Crossing | None:
