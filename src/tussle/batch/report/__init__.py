@@ -71,7 +71,7 @@ def write_report(
     question, sentences = results.answers(target, over), list[str]()
     if question is not None:
         sentences = [f"{sentence}." for sentence in question.sentences()]
-        asked = [*further(question, results), *asked]
+        asked = [*asked, *further(question, results)]
     page = write_page(
         Path(directory) / INDEX, sections, pictures,
         title=str(results.info.get("name") or "A batch of games"), version=str(results.info.get("tussle", "")),
