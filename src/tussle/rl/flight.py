@@ -291,7 +291,7 @@ def registered_task(name: str, where: str) -> Task:
     known = registered_tasks()
     if name not in known:
         near = nearest_name(name, known) or nearest_name(f"tussle/{name}-v0", known)
-        what = f"there is no task {name!r}{near}" if name else "no task is named"
+        what = f"there is no task {name!r}{near}" if name else "name one"
         raise ParameterError(f"{where}: {what}; {listed(known)}; `tussle.rl.register` adds others")
     return task_of(known[name])
 
@@ -322,7 +322,10 @@ def load_flight(path: str, task: str, block: str) -> LearnedFlight:
 def _flight(stamps: tuple[tuple[str, tuple[int, int]], ...], task: str, block: str) -> LearnedFlight:
     policies = [_policy(*stamp) for stamp in stamps]
     name = task or policies[0].task
-    where = "Learned.task" if task or not name else f"metadata of {policies[0].path}, {TASK_KEY}"
+    file = policies[0].path
+    where = f"metadata of {file}, {TASK_KEY}" if name else f"{file} names no task"
+    if task:
+        where = "Learned.task"
     return LearnedFlight(policies, registered_task(name, where), name, block)
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import shutil
+
 import pytest
 
 
@@ -60,7 +62,7 @@ def test_a_run_that_was_cut_is_plotted_and_it_is_said(tussle, played):
     assert said.stdout == "played/plots/left.png\n"
 
 
-def test_a_run_with_a_plugin_of_ones_own_is_noted_in_one_line(tussle, folder):
+def test_a_run_with_a_plugin_of_ones_own_needs_no_path_unless_its_copy_is_lost(tussle, folder):
     (folder / "mine.py").write_text(
         'from tussle.stock import Predator\n\n\nclass Mine(Predator):\n    """Mine."""\n'
     )
@@ -76,6 +78,8 @@ def test_a_run_with_a_plugin_of_ones_own_is_noted_in_one_line(tussle, folder):
         "--out",
         "mine",
     )
+    assert tussle("plot", "mine", "--out", "first").stderr == ""
+    shutil.rmtree(folder / "mine" / "plugins")
     notes = tussle("plot", "mine").stderr.splitlines()
     assert len(notes) == 1
     assert "there is no plugin 'Mine'" in notes[0]

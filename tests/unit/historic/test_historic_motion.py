@@ -185,6 +185,7 @@ def pilot(model):
 def test_worlds_of_a_stack_are_as_alone():
     """All models in one game by random commands."""
     names = [name for name, path in historic.manifest().items() if ".motion." in path and "-" not in name]
+    names = [name for name in names if not name.startswith("JSBSim")]  # which need a script
     blocks = [
         Block(name=name, count=2, position=(0, 50 * i, 200), speed=20, motion=model, autonomy=pilot(model))
         for i, name in enumerate(names)

@@ -143,7 +143,7 @@ class JSBSimFlight:
             fdm[name] = value
         if not self.is_placed:
             self.is_placed = True
-            if not start.is_historic:
+            if not start.is_historic or start.trim != "none":
                 fdm["propulsion/set-running"] = -1
             if start.trim != "none":
                 self._trim()
