@@ -54,7 +54,7 @@ class Results:
     """Results of the runs of a batch; of an unfinished batch, those of its finished runs.
 
     Failed runs are in no share, mean or comparison; `n_failed` says how many there are. Where several points are taken together,
-    intervals are those of the mean over these points, and the differences between points are no part of their width. The runs of
+    means and intervals are those over these points, each as much as another; how they differ is no part of the width. The runs of
     a seed then count as one block, since they share their random numbers; of one seed there is no interval.
 
     Args:

@@ -219,8 +219,8 @@ def mean_of(
         name: The quantity.
         values: Its value for each run, (n,).
         blocks: Number of the block that each run belongs to, (n,); None where runs are independent.
-        strata: Number of the point that each run belongs to, (n,); None for runs of one point. The interval is that of the mean over
-            these points: how they differ is no part of its width.
+        strata: Number of the point that each run belongs to, (n,); None for runs of one point. Mean and interval are those over these
+            points, each of which counts as much, however many runs it has; how they differ is no part of the width.
         are_copies: The runs of a block are copies of one run, so that no block goes over several points.
         is_share: The quantity is a share, see `within_one`.
     """
@@ -229,6 +229,8 @@ def mean_of(
         return mean
     is_known = np.isfinite(values)
     block, stratum = (None if by is None else by[is_known] for by in (blocks, strata))
+    if stratum is not None:
+        mean = replace(mean, value=_over_strata(values[is_known], stratum)[0])
     if stratum is not None and (block is None or are_copies):
         low, high = stratified_interval(values[is_known], stratum, block)
     else:
@@ -278,7 +280,7 @@ def stratified_interval(
         strata: Number of the point that it belongs to, (n,).
         copies: Number of the distinct run that it is a copy of, (n,); None if all are distinct.
     """
-    _, stratum, n = np.unique(strata, return_inverse=True, return_counts=True)
+    mean, stratum = _over_strata(values, strata)
     first = slice(None) if copies is None else np.unique(copies, return_index=True)[1]
     own, stratum = values[first], stratum[first]
     n_own = np.bincount(stratum)
@@ -286,13 +288,19 @@ def stratified_interval(
         return math.nan, math.nan
     apart = own - (np.bincount(stratum, own) / n_own)[stratum]
     apart[np.abs(apart) <= ROUNDING * np.abs(own)] = 0.0
-    parts = (n / len(values)) ** 2 * np.bincount(stratum, apart**2) / (n_own - 1) / n_own
-    mean, variance = float(values.mean()), float(parts.sum())
+    parts = np.bincount(stratum, apart**2) / (n_own - 1) / n_own / len(n_own) ** 2
+    variance = float(parts.sum())
     if variance == 0.0:
         return mean, mean
     freedom = variance**2 / float((parts**2 / (n_own - 1)).sum())
     half = float(scipy_package().special.stdtrit(freedom, 0.5 + LEVEL / 2.0)) * math.sqrt(variance)
     return mean - half, mean + half
+
+
+def _over_strata(values: np.ndarray, strata: np.ndarray) -> tuple[float, np.ndarray]:
+    """Mean of the means of strata, and the number of the stratum of each value, (n,), from 0 on."""
+    _, stratum = np.unique(strata, return_inverse=True)
+    return float((np.bincount(stratum, values) / np.bincount(stratum)).mean()), stratum
 
 
 def means_of(name: str, rows: Sequence[np.ndarray], *, is_share: bool = False) -> list[Mean]:
@@ -379,8 +387,8 @@ def _by_bootstrap(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def block_values(values: np.ndarray, blocks: np.ndarray, strata: np.ndarray | None = None) -> np.ndarray:
     """One value for each block, (n_blocks,): their mean is that of all values, and so is its variance from block to block.
 
-    The mean plus what the block adds to it; for blocks of equal size, the mean of the block. With strata, the mean plus what the block
-    adds to the means of the strata, so that blocks in which some strata are missing do not differ for that.
+    The mean plus what the block adds to it; for blocks of equal size, the mean of the block. With strata, the mean of their means plus
+    what the block adds to these, so that blocks in which some strata are missing do not differ for that.
 
     Args:
         values: Value of each run, (n,).
@@ -389,12 +397,15 @@ def block_values(values: np.ndarray, blocks: np.ndarray, strata: np.ndarray | No
     """
     if len(values) == 0:
         return values
-    mean = centre = values.mean()
+    mean = centre = float(values.mean())
+    weight = 1.0
     if strata is not None:
-        _, stratum = np.unique(strata, return_inverse=True)
-        centre = (np.bincount(stratum, values) / np.bincount(stratum))[stratum]
+        mean, stratum = _over_strata(values, strata)
+        n = np.bincount(stratum)
+        centre = (np.bincount(stratum, values) / n)[stratum]
+        weight = (len(values) / (len(n) * n))[stratum]
     numbers, block = np.unique(blocks, return_inverse=True)
-    sums: np.ndarray = np.bincount(block, values - centre)
+    sums: np.ndarray = np.bincount(block, weight * (values - centre))
     shares: np.ndarray = mean + sums * (len(numbers) / len(values))
     return shares
 

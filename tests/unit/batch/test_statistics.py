@@ -190,7 +190,24 @@ def test_intervals_over_points_hold_the_mean_over_these_points_as_often_as_they_
 def test_blocks_that_lack_a_point_do_not_differ_for_that():
     values, points = np.array([1.0, 100.0, 1.0, 100.0, 1.0]), np.array([0, 1, 0, 1, 0])
     mean = mean_of("x", values, np.array([0, 0, 1, 1, 2]), points)
-    assert mean.low == mean.high == pytest.approx(values.mean())
+    assert mean.low == mean.high == pytest.approx(50.5)
+
+
+@pytest.mark.parametrize("are_blocks", [True, False])
+def test_a_point_that_was_played_more_often_counts_no_more(are_blocks):
+    """Batches with a target play on where the answer is open; there the mean over all runs is not that over the points."""
+    rng, held = np.random.default_rng(8), 0
+    points, seeds = (
+        np.repeat([0, 1, 2], [40, 10, 10]),
+        np.concatenate([np.arange(40), np.arange(10), np.arange(10)]),
+    )
+    effect = np.array([0.0, 3.0, 9.0])
+    for _ in range(300):
+        values = effect[points] + rng.normal(size=60)
+        mean = mean_of("x", values, seeds if are_blocks else None, points)
+        assert mean.value == pytest.approx(np.mean([values[points == k].mean() for k in range(3)]))
+        held += mean.low <= 4.0 <= mean.high
+    assert abs(held / 300 - 0.95) < 4.0 * (0.95 * 0.05 / 300) ** 0.5
 
 
 def test_shares_over_points_stay_within_0_and_1_and_hold_as_often_as_they_say():
