@@ -137,7 +137,7 @@ def test_two_runs_are_counted_and_named_apart(chromium, runs, is_over):
         )
         watched.wait(f"player.chosen === {who + page.game.id_shift} && player.isDrawn")
         facts = dict(zip(text(watched, "#chosen > dl dt"), text(watched, "#chosen > dl dd"), strict=True))
-        assert facts["Team"] == f"{frame.team[row]} B {runs[1].teams[int(frame.team[row])]}"
+        assert facts["Team"] == f"B {runs[1].teams[int(frame.team[row])]}"
         for name, coordinate in zip(("East", "North", "Up"), frame.pos[row], strict=True):
             assert float(facts[name].removesuffix(" m").replace("−", "-")) == pytest.approx(
                 coordinate, abs=0.06

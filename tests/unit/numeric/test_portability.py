@@ -98,6 +98,7 @@ def kernel_modules() -> list[str]:
 def kernels_of(module: str) -> list[Kernel]:
     """All kernels that exist after the module is imported and that are its own; generated ones too."""
     loaded = importlib.import_module(module)
+    gc.unfreeze()  # conftest.py takes what collection makes from the collector, which then does not list it
     # By type(): isinstance would ask weak proxies whose object is gone.
     alive = [value for value in gc.get_objects() if issubclass(type(value), Kernel)]
     own = [each for each in alive if each.py_func.__globals__ is vars(loaded)]
