@@ -138,7 +138,8 @@ def test_aircraft_of_jsbsim_fly_as_recorded_but_for_the_start_of_the_engine(
 ) -> None:
     """Two lots of aircraft, for 10 s, begun a step before the recording, at places of whole millionths of a degree.
 
-    They agree until the engine starts, whose first turns JSBSim computes in another way since 1.2: that leaves half a metre.
+    They agree until the engine starts, whose first turns JSBSim computes in another way than the version of the recording: that leaves
+    half a metre.
     """
     pytest.importorskip("jsbsim")
     place = folder()

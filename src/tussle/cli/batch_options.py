@@ -8,7 +8,15 @@ from typing import Annotated
 
 import typer
 
-from tussle.cli.options import LARGEST_SEED, MissionOptions, argument, columns_option, flag, option
+from tussle.cli.options import (
+    LARGEST_SEED,
+    MissionOptions,
+    argument,
+    columns_option,
+    flag,
+    option,
+    over_option,
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,13 +89,7 @@ class BatchOptions(ManyGamesOptions):
             "1,000 games of each point, or --runs.",
         ),
     ] = None
-    over: Annotated[
-        str | None,
-        option(
-            "NAME",
-            "The variable whose smallest value is searched; by default the first range, or choice of numbers.",
-        ),
-    ] = None
+    over: Annotated[str | None, over_option()] = None
     directory: Annotated[
         Path | None,
         option(
@@ -199,13 +201,7 @@ class AnalyzeOptions:
             "'Guard.share >= 0.95'; by default the target of the command that played the batch.",
         ),
     ] = None
-    over: Annotated[
-        str | None,
-        option(
-            "NAME",
-            "The variable whose smallest value is searched; by default the first range, or choice of numbers.",
-        ),
-    ] = None
+    over: Annotated[str | None, over_option()] = None
     by_point: Annotated[bool, flag("--by-point", "Show all points, not only twenty.")] = False
     as_json: Annotated[bool, flag("--json", "Print everything as JSON.")] = False
 
@@ -233,10 +229,4 @@ class ReportOptions:
             "Open with the answer to this question, as of tussle analyze; by default that of the command that played the batch.",
         ),
     ] = None
-    over: Annotated[
-        str | None,
-        option(
-            "NAME",
-            "The variable whose smallest value is searched; by default the first range, or choice of numbers.",
-        ),
-    ] = None
+    over: Annotated[str | None, over_option()] = None

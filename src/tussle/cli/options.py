@@ -45,6 +45,14 @@ def columns_option() -> Any:
     )
 
 
+def over_option() -> Any:
+    """The option for the variable that the answer to a target is about."""
+    return option(
+        "NAME",
+        "The variable whose smallest value is searched; by default the first range, or choice of numbers.",
+    )
+
+
 def flag(name: str, text: str) -> Any:
     """An option without a value."""
     return typer.Option(name, help=text)

@@ -324,6 +324,9 @@ def planned_by(options: RunOptions) -> PlannedRun:
     """
     from tussle.batch.reload import planned_run, recorded_run
 
+    def may_run(code: DirectoryCode) -> bool:
+        return _may_run(code, options.trust)
+
     text = options.from_batch or ""
     directory, colon, number = text.rpartition(":")
     for run, world in ((text, "0"), (directory, number)):
@@ -331,7 +334,7 @@ def planned_by(options: RunOptions) -> PlannedRun:
             return recorded_run(
                 Path(run),
                 int(world),
-                may_run=lambda code: _may_run(code, options.trust),
+                may_run=may_run,
                 allow_large=options.allow_large,
                 search=options.data_path,
             )
@@ -343,7 +346,7 @@ def planned_by(options: RunOptions) -> PlannedRun:
     return planned_run(
         Path(directory),
         int(number),
-        may_run=lambda code: _may_run(code, options.trust),
+        may_run=may_run,
         allow_large=options.allow_large,
         search=options.data_path,
     )

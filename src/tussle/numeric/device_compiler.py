@@ -39,9 +39,8 @@ def device_compiler() -> Any:
             state.library = DeviceLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
             super().run_pass(state)
             state.library.finalize()
-            own = list[
-                Any
-            ]().append  # Numba knows a function by a built-in one of its own, which Python does not call
+            # Numba knows a compiled function by a built-in one of its own, which Python does not call.
+            own = list[Any]().append
             state.targetctx.insert_user_function(own, state.cr.fndesc, [state.library])
             state.cr = state.cr._replace(cfunc=own)
             return True

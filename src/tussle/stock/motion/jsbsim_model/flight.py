@@ -310,7 +310,7 @@ def load(aircraft: Aircraft, dt: float) -> Any:
 
 
 def _make_spherical(fdm: Any) -> None:
-    """Replace the ellipsoid by a sphere of its equatorial radius, as JSBSim 1.1 had where SCRIMMAGE calls it."""
+    """Replace the ellipsoid by a sphere of its equatorial radius, over which the aircraft of SCRIMMAGE's recordings fly."""
     axes = "".join(f'<{name}_axis unit="M">{SEMI_MAJOR}</{name}_axis>' for name in ("semimajor", "semiminor"))
     with tempfile.NamedTemporaryFile("w", suffix=".xml") as file:
         file.write(f'<planet name="sphere">{axes}</planet>')
