@@ -257,7 +257,8 @@ def cruise(n: int, model: Any, aircraft: str) -> Any:
 
 def predator_prey(n: int, model: Any, aircraft: str) -> Any:
     """The game of the paper's Table 1: n - 10 prey that fly as aircraft, 5 + 5 predators, faster than the prey as there."""
-    from tussle import Block, Mission, stock
+    from tussle import Block, Mission
+    from tussle.plugins import stock
 
     def predators(name: str, team: int, switching: bool) -> Any:
         hunter = stock.Predator(max_speed=65.0, capture_range=5.0, allow_prey_switching=switching)

@@ -15,9 +15,9 @@ import measuring
 import numpy as np
 
 from tussle import Block, Mission, Simulation
-from tussle.contacts import found
 from tussle.scene import Cuboid, FlatGround, Scene
 from tussle.stock import Ballistic, BulletCollision, FreeBody
+from tussle.world.contacts import found
 
 SETTLING = 300
 SOLID = 0.4 * 0.25

@@ -22,8 +22,8 @@ import psutil
 
 from tussle import Block, Mission, Simulation
 from tussle.api import Autonomy, Output
+from tussle.plugins.stock.motion.jsbsim_model.flight import STATE
 from tussle.stock import JSBSimControl
-from tussle.stock.motion.jsbsim_model.flight import STATE
 
 STEP = 1 / 120  # [s]
 COMMANDS = {

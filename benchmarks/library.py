@@ -22,10 +22,11 @@ from typing import Any
 
 import measuring
 
-from tussle import Block, Mission, Simulation, stock
+from tussle import Block, Mission, Simulation
 from tussle.api import RigidBodyModel
 from tussle.engine.schedule import compose
 from tussle.errors import TussleError
+from tussle.plugins import stock
 from tussle.testing.partners import driver
 
 SIZES = (1_000, 10_000)

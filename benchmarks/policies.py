@@ -17,10 +17,10 @@ import numpy as np
 from statsmodels.stats.proportion import proportion_confint
 
 from tussle import Mission, Simulation
+from tussle.plugins.stock.autonomy import learned
 from tussle.rl import PredatorTeam, PreyEscape, Term, alive, evaluate
 from tussle.rl.flight import Policy
 from tussle.stock import Learned
-from tussle.stock.autonomy import learned
 
 STACK = 50
 """Games of one stack."""

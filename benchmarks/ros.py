@@ -17,7 +17,7 @@ import time
 import numpy as np
 
 from tussle import Block, Mission, Simulation
-from tussle.ros.node import load_rospy, master_fault
+from tussle.plugins.links.ros.node import load_rospy, master_fault
 from tussle.stock import ROSAutonomy, ROSClockServer, SimpleCar
 
 PERIOD = 0.1  # [s]

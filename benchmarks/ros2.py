@@ -16,8 +16,8 @@ import time
 import numpy as np
 
 from tussle import Block, Mission, Simulation
-from tussle.ros.dds import Ros2Link
-from tussle.ros.messages import ENCAPSULATION
+from tussle.plugins.links.ros.dds import Ros2Link
+from tussle.plugins.links.ros.messages import ENCAPSULATION
 from tussle.stock import ROS2Autonomy, ROS2ClockServer, SimpleCar
 
 PERIOD = 0.1  # [s]

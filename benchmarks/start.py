@@ -21,7 +21,7 @@ import measuring
 import tussle
 
 FIRST_STEP = "import sys; sys.path.insert(0, {here!r}); import game; game.Simulation(game.mission()).step()"
-EDITED = "stock/autonomy/boids/kernels.py"
+EDITED = "plugins/stock/autonomy/boids/kernels.py"
 BEFORE, AFTER = "2.0 * (w * z + x * y)", "(w * z + x * y) * 2.0"
 
 

@@ -81,7 +81,7 @@ def _own_state(tmp_path_factory):
 @pytest.fixture(scope="session")
 def roscore(tmp_path_factory):
     """Address of a ROS master, for nodes of this process too; where ROS is not installed, the test is skipped."""
-    from tussle.ros.node import master_fault
+    from tussle.plugins.links.ros.node import master_fault
 
     needs.require("roscore", "rospy")
     with socket.create_server(("127.0.0.1", 0)) as server:

@@ -68,7 +68,7 @@ def _has_headers(*names: str) -> Callable[[], bool]:
 
 def _has_rospy() -> bool:
     from tussle.errors import MissingExtraError
-    from tussle.ros.node import load_rospy
+    from tussle.plugins.links.ros.node import load_rospy
 
     try:
         load_rospy()

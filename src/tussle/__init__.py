@@ -2,11 +2,12 @@
 
 from typing import TYPE_CHECKING, Any
 
+from tussle import former_names
 from tussle.engine.result import WorldResult
 from tussle.engine.simulation import Simulation
 from tussle.errors import TussleError, nearest_name
 from tussle.mission import Block, Mission, read_mission
-from tussle.scene import Scene
+from tussle.world.scene import Scene
 
 if TYPE_CHECKING:
     from tussle.record import Recorder, load_run, read_table
@@ -26,6 +27,8 @@ __all__ = [
     "read_mission",
     "read_table",
 ]
+
+former_names.install()
 
 
 def __getattr__(name: str) -> Any:

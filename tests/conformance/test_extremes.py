@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from tussle import stock
 from tussle.errors import ParameterError
+from tussle.plugins import stock
 from tussle.stock import Boundary
 from tussle.testing.game import build
 from tussle.testing.limits import check_extremes

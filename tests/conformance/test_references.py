@@ -7,9 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from tussle import Block, Mission, Simulation, stock
+from tussle import Block, Mission, Simulation
 from tussle.api import Autonomy, Controller, MotionModel, Plugin
 from tussle.errors import TussleError
+from tussle.plugins import stock
 
 OWN_NAMES = {
     ("Learned", "block"): "a block of the task",

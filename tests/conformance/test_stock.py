@@ -11,8 +11,8 @@ from autopilot_peers import JsonServant, Px4Crowd, ScrimmageServant, free_ports
 from moos_database import MoosDatabase
 from moos_helm import MoosHelm
 
-from tussle import historic, stock
 from tussle.api import Plugin
+from tussle.plugins import historic, stock
 from tussle.stock import Boundary
 from tussle.testing import check_plugin
 

@@ -9,9 +9,9 @@ import numpy as np
 from matplotlib.colors import ListedColormap
 
 from tussle import Block, Mission, Simulation
-from tussle.rays.solids import KINDS
 from tussle.scene import Cuboid, FlatGround, HeightField, Prism, Scene
 from tussle.stock import DepthCamera, Still
+from tussle.world.rays.solids import KINDS
 
 IMAGE = Path(__file__).resolve().parents[2] / "docs" / "images" / "depth-camera.png"
 COLORS = ("white", "yellowgreen", "slategray", "peru", "crimson")

@@ -10,10 +10,10 @@ from typing import Any
 
 from pages import ROOT
 
-from tussle import historic, stock
+from tussle.plugins import historic, stock
 
 PAGE = ROOT / "docs" / "parity.md"
-FILE = ROOT / "src" / "tussle" / "historic" / "differences.toml"
+FILE = ROOT / "src" / "tussle" / "plugins" / "historic" / "differences.toml"
 SECTIONS = ("engine", "placing", "motion", "controller", "autonomy", "sensor", "world")
 KINDS = ("motion", "controller", "autonomy", "sensor", "interaction", "metric", "network")
 FIELDS = ("plugin", "theirs", "ours", "reason", "compat", "test")

@@ -12,10 +12,9 @@ from pages import ROOT
 from reference import about, described, members
 
 import tussle
-from tussle import stock
 from tussle.api import Plugin
 from tussle.cli.pages import KINDS, first_sentence
-from tussle.columns import (
+from tussle.declare.columns import (
     Children,
     Column,
     EntityRef,
@@ -27,6 +26,7 @@ from tussle.columns import (
     State,
     Subscribe,
 )
+from tussle.plugins import stock
 
 FOLDER = ROOT / "docs" / "plugins"
 INDEX = FOLDER / "index.md"

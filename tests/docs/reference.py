@@ -14,7 +14,7 @@ from pages import ROOT
 
 from tussle.api import Plugin
 from tussle.cli import pages as terminal
-from tussle.columns import Column, Numbers, Param, Publish, Subscribe
+from tussle.declare.columns import Column, Numbers, Param, Publish, Subscribe
 from tussle.messages import Message
 
 PAGE = ROOT / "docs" / "reference.md"

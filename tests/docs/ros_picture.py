@@ -13,7 +13,7 @@ from matplotlib.collections import PolyCollection
 
 from tussle import Simulation
 from tussle.mission import read_mission
-from tussle.ros.node import DEBIAN
+from tussle.plugins.links.ros.node import DEBIAN
 
 ROOT = Path(__file__).resolve().parents[2]
 IMAGE = ROOT / "docs" / "images" / "ros_maze.png"

@@ -11,7 +11,7 @@ import pytest
 from pages import ROOT
 from parity_page import KINDS, PAGE, SECTIONS, differences, parity_page, plugins_of, rows
 
-from tussle import historic, stock
+from tussle.plugins import historic, stock
 
 STATES = ("works", "works otherwise: ", "dropped: ", "not yet: ")
 
@@ -95,6 +95,6 @@ def test_each_plugin_of_scrimmage_has_a_state():
     missing = set(differences()["missing"])
     assert set(names) - set(stock.manifest()) == missing
     assert not missing & set(stock.manifest())
-    unread = ROOT / "src" / "tussle" / "stock" / "historic.toml"
+    unread = ROOT / "src" / "tussle" / "plugins" / "stock" / "historic.toml"
     assert missing == set(tomllib.loads(unread.read_text())["plugins"]["names"])
     assert all(why.startswith(("dropped: ", "not yet: ")) for why in differences()["missing"].values())

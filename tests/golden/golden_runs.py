@@ -9,8 +9,9 @@ from pathlib import Path
 
 from missions import NAMES, SEEDS, STEPS, mission
 
-from tussle import Simulation, stock
+from tussle import Simulation
 from tussle.mission import read_mission
+from tussle.plugins import stock
 
 FILE = Path(__file__).with_name("golden.json")
 STOCK = Path(stock.__file__).parent

@@ -14,9 +14,10 @@ from pathlib import Path
 import numpy as np
 from golden_runs import STOCK
 
-from tussle import Simulation, historic, stock
+from tussle import Simulation
 from tussle.engine.snapshot import hashed
 from tussle.mission import read_mission
+from tussle.plugins import historic, stock
 
 FILE = Path(__file__).with_name("historic.json")
 STEPS = 30

@@ -27,7 +27,8 @@ from golden_runs import (
 )
 from missions import NAMES, SEEDS, STEPS, mission
 
-from tussle import Simulation, stock
+from tussle import Simulation
+from tussle.plugins import stock
 
 STACK = (11, 2, 12, 13, 1, 14, 15, 16, 17, 18, 19, 20, 21, 22, 23, 3)
 """Sixteen seeds; those that are kept stand at places 4, 1 and 15."""

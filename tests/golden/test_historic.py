@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from historic_runs import folder_of, folders, kept, play
 
-from tussle import historic
+from tussle.plugins import historic
 
 
 def test_all_laws_are_kept():

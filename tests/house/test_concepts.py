@@ -39,7 +39,7 @@ def test_what_doubled_another_name_is_gone():
     assert not [(name, thing) for name in GONE for thing in given if hasattr(thing, name)]
 
 
-NAMELESS = ("src/tussle/columns.py", "src/tussle/mission/", "src/tussle/engine/", "src/tussle/api/")
+NAMELESS = ("src/tussle/declare/columns.py", "src/tussle/mission/", "src/tussle/engine/", "src/tussle/api/")
 
 
 def names_in(text: str) -> set[str]:

@@ -7,9 +7,9 @@ import ast
 import pytest
 from tree import parsed, python_files, relative
 
-from tussle import stock
 from tussle.api import Plugin
 from tussle.errors import ParameterError
+from tussle.plugins import stock
 
 HARMLESS = {
     (

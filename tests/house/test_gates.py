@@ -16,13 +16,13 @@ OWN_READERS = {
     "src/tussle/cli/scaffold/__init__.py": "files of the package",
     "src/tussle/cli/scaffold/played.py": "files of the package",
     "src/tussle/cli/scaffold/copied.py": "files of the package",
-    "src/tussle/stock/__init__.py": "files of the package",
-    "src/tussle/neighbors/lanes.py": "files of the package",
+    "src/tussle/plugins/stock/__init__.py": "files of the package",
+    "src/tussle/numeric/neighbors/lanes.py": "files of the package",
     "src/tussle/numeric/store.py": "files of the package",
     "src/tussle/view/page/assemble.py": "files of the package",
     "src/tussle/batch/report/__init__.py": "files of the package",
     "src/tussle/batch/dask_worker.py": "files of the package",
-    "src/tussle/ros/domain.py": "a file of the system",
+    "src/tussle/plugins/links/ros/domain.py": "a file of the system",
     "src/tussle/batch/slurm.py": "the log of a job of one's own",
     "src/tussle/batch/batch.py": "mission files that were read before",
     "src/tussle/rl/league.py": "the policy of a contestant, which is run",
@@ -33,7 +33,7 @@ OWN_READERS = {
     "src/tussle/batch/damage.py": "tables, after a check of the size",
     "src/tussle/folders.py": "safe access to files of the user",
     "src/tussle/cli/terminal.py": "the null device",
-    "src/tussle/stock/autonomy/joystick/device.py": "a device of the system",
+    "src/tussle/plugins/stock/autonomy/joystick/device.py": "a device of the system",
 }
 """Modules that open files themselves, and which files these are."""
 FOREIGN = {

@@ -20,9 +20,9 @@ FOR_KERNELS = (
     "numba",
     "math",
     "tussle.numeric",
-    "tussle.rng",
-    "tussle.neighbors",
-    "tussle.contacts",
+    "tussle.numeric.rng",
+    "tussle.numeric.neighbors",
+    "tussle.world.contacts",
 )
 # Of NumPy, what makes scratch arrays and names constants and types, and the functions that IEEE 754 rounds exactly.
 NUMPY_FOR_KERNELS = {
@@ -41,7 +41,14 @@ IMPORTED_AS = {
     "grpcio": "grpc",
     "grpcio_tools": "grpc_tools",
 }
-OPTIONAL_PARTS = ("tussle.view", "tussle.batch", "tussle.rl", "tussle.plan", "tussle.bridges", "tussle.cli")
+OPTIONAL_PARTS = (
+    "tussle.view",
+    "tussle.batch",
+    "tussle.rl",
+    "tussle.plan",
+    "tussle.cli.bridges",
+    "tussle.cli",
+)
 
 
 def is_within(name: str, packages: tuple[str, ...]) -> bool:

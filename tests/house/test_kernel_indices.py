@@ -1,8 +1,8 @@
 """No kernel indexes with a number from a column: machine code checks no bounds, and a column can hold any number.
 
 Numbers read from the engine's own index arrays are in range by construction. An id becomes a row through `row_of`, which checks it.
-The kernels of `tussle.neighbors` read index arrays, and positions, which `cell_of` brings into range; those of `tussle.rays` read
-trees of their own and bring cells and bins into range; those of `tussle.plan` a hash table of their own. They are left out.
+The kernels of `tussle.numeric.neighbors` read index arrays, and positions, which `cell_of` brings into range; those of `tussle.world.rays`
+read trees of their own and bring cells and bins into range; those of `tussle.plugins.plan` a hash table of their own. They are left out.
 """
 
 from __future__ import annotations

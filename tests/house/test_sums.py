@@ -5,25 +5,12 @@ from pathlib import Path
 
 from tree import ROOT
 
-PLACES = (
-    "aircraft",
-    "contacts",
-    "geodesy.py",
-    "historic",
-    "neighbors",
-    "numeric",
-    "plan",
-    "prism.py",
-    "rays",
-    "scene.py",
-    "shapes.py",
-    "stock",
-)
+PLACES = ("aircraft", "numeric", "plugins", "world")
 WHOLE = {
-    "src/tussle/rays/files.py": "vertices of the faces of a file",
-    "src/tussle/stock/autonomy/moos/wire.py": "lengths of messages",
-    "src/tussle/stock/autonomy/rl_simple/actors.py": "actors with whole actions",
-    "src/tussle/stock/autonomy/rl_simple/remote.py": "actors with whole actions",
+    "src/tussle/world/rays/files.py": "vertices of the faces of a file",
+    "src/tussle/plugins/stock/autonomy/moos/wire.py": "lengths of messages",
+    "src/tussle/plugins/stock/autonomy/rl_simple/actors.py": "actors with whole actions",
+    "src/tussle/plugins/stock/autonomy/rl_simple/remote.py": "actors with whole actions",
 }
 """Modules that sum whole numbers."""
 

@@ -32,8 +32,8 @@ def test_every_file_of_the_package_ships_but_declarations_for_the_type_checker_o
     [
         r"tussle/py\.typed",
         r"tussle/mission/library/predator_prey\.xml",
-        r"tussle/stock/manifest\.toml",
-        r"tussle/stock/motion/unicycle/(__init__\.py|example\.xml)",
+        r"tussle/plugins/stock/manifest\.toml",
+        r"tussle/plugins/stock/motion/unicycle/(__init__\.py|example\.xml)",
         r"tussle/cli/scaffold/templates/\w+\.py",
         r"tussle/view/.*\.js",
         r"tussle/view/.*\.css",

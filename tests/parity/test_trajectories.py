@@ -16,7 +16,8 @@ import pytest
 from recordings import NAMES, Recording, folder, load, mission
 from replay import Flight, fly
 
-from tussle import Mission, Simulation, historic, stock
+from tussle import Mission, Simulation
+from tussle.plugins import historic, stock
 from tussle.record import FirstStates
 
 LIMIT = 1e-6  # [m]

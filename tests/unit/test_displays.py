@@ -7,11 +7,13 @@ from html.parser import HTMLParser
 
 import pytest
 
-from tussle import Block, Mission, Recorder, Simulation, displays, load_run, stock
+from tussle import Block, Mission, Recorder, Simulation, load_run
 from tussle.api import Autonomy, Input, Param
 from tussle.batch import Batch
-from tussle.columns import Column
-from tussle.displays import MAX_HTML, MAX_LINE, counted, listing, page, shortened, table
+from tussle.declare import displays
+from tussle.declare.columns import Column
+from tussle.declare.displays import MAX_HTML, MAX_LINE, counted, listing, page, shortened, table
+from tussle.plugins import stock
 from tussle.stock import Boids, SimpleCapture, SimpleCaptureMetrics, Still, Unicycle
 
 HOSTILE = """<script>alert("1")</script>'>&amp;<img src=x onerror=alert(1)>\n\x1b[31m\u202e"""

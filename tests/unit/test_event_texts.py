@@ -6,7 +6,7 @@ from importlib.resources import files
 
 import pytest
 
-from tussle.event_texts import END_TEXTS, EVENT_TEXTS, end_text, event_text
+from tussle.record.event_texts import END_TEXTS, EVENT_TEXTS, end_text, event_text
 
 
 @pytest.mark.parametrize(

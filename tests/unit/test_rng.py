@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tussle import rng
+from tussle.numeric import rng
 from tussle.numeric.kernel import kernel
 
 FULL = 2**64 - 1

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tussle import units
+from tussle.declare import units
 from tussle.errors import DeclarationError, ParameterError, UnitError
 
 DEFINITIONS = [

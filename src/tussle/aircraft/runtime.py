@@ -9,7 +9,7 @@ import numpy as np
 
 from tussle.numeric import atan2, exp, log
 from tussle.numeric.kernel import Device, device
-from tussle.rng import normal2, uniform2
+from tussle.numeric.rng import normal2, uniform2
 
 
 class Outlined(Device):

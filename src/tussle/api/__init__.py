@@ -32,7 +32,7 @@ from tussle.api.rigid_body import InertiaParam, PositiveParam, RigidBodyModel
 from tussle.api.row_laws import row_law
 from tussle.api.state_follower import StateFollower
 from tussle.api.world import WorldView
-from tussle.columns import (
+from tussle.declare.columns import (
     Children,
     EntityRef,
     Field,
@@ -44,9 +44,9 @@ from tussle.columns import (
     State,
     Subscribe,
 )
-from tussle.comms import EVERYONE, SAME_ENTITY
-from tussle.lists import RaggedColumn
-from tussle.messages import Message, Messages
+from tussle.declare.comms import EVERYONE, SAME_ENTITY
+from tussle.declare.lists import RaggedColumn
+from tussle.declare.messages import Message, Messages
 from tussle.numeric import wrap
 from tussle.numeric.arrays import unit
 

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from tussle.columns import EntityRef, Handle, Output, State
-from tussle.comms import Publisher
-from tussle.messages import Messages
+from tussle.declare.columns import EntityRef, Handle, Output, State
+from tussle.declare.comms import Publisher
+from tussle.declare.messages import Messages
 
 
 def step_some(plugin: Any, view: Any, active: np.ndarray) -> None:

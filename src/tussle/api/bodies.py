@@ -9,8 +9,8 @@ import numpy as np
 
 from tussle.api import kernels
 from tussle.errors import listed, nearest_name
-from tussle.neighbors.index import Index, Split, padded
-from tussle.rays.bodies import BodyTree
+from tussle.numeric.neighbors.index import Index, Split, padded
+from tussle.world.rays.bodies import BodyTree
 
 FLOATS = {
     "pos": 3,

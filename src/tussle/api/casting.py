@@ -9,8 +9,8 @@ import numpy as np
 from tussle.api.bodies import Bodies
 from tussle.api.context import Context
 from tussle.errors import ParameterError
-from tussle.rays import kernels, touching
-from tussle.rays.hits import FARTHEST_RAY, Hits, checked_numbers, checked_vectors, new_rays
+from tussle.world.rays import kernels, touching
+from tussle.world.rays.hits import FARTHEST_RAY, Hits, checked_numbers, checked_vectors, new_rays
 
 RAYS_PER_THREAD = 1024
 

@@ -6,9 +6,9 @@ from collections.abc import Callable, Mapping
 from functools import cache
 from typing import Any, NamedTuple
 
-from tussle import texts
 from tussle.api.channels import DRIVEN_CHANNELS
-from tussle.columns import Param
+from tussle.declare import texts
+from tussle.declare.columns import Param
 from tussle.errors import ParameterError, listed, nearest_name
 
 NUMBERS = "number", "input_min", "input_max", "output_min", "output_max", "factor"

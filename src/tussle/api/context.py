@@ -15,8 +15,8 @@ from tussle.api.clock import Clock
 from tussle.api.draw import Draw
 from tussle.api.mass import MassProperties
 from tussle.errors import PluginError, TussleError, listed, nearest_name
-from tussle.rng import stream_key
-from tussle.scene import Scene, TeamRegion, find_region
+from tussle.numeric.rng import stream_key
+from tussle.world.scene import Scene, TeamRegion, find_region
 
 PARTS_PER_THREAD = 4
 """Parts that `Context.split` makes for each thread: a slow thread then delays the others less."""

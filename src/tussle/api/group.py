@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from tussle import rng
 from tussle.api import casting, kernels
 from tussle.api.acting import restart, step_some
 from tussle.api.bodies import (
@@ -26,8 +25,9 @@ from tussle.api.context import Context, stream
 from tussle.api.draw import Draw
 from tussle.api.pairs import Nearest, Pairs, find_nearest, find_pairs
 from tussle.errors import PluginError, listed, nearest_name
-from tussle.neighbors.index import Index, next_size
-from tussle.scene import Hits, Scene, TeamRegion
+from tussle.numeric import rng
+from tussle.numeric.neighbors.index import Index, next_size
+from tussle.world.scene import Hits, Scene, TeamRegion
 
 ROWS_PER_THREAD = 4096
 """Minimum number of rows per thread: a kernel takes about 20 ns per row, starting a thread 50 us."""

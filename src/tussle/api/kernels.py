@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 
-from tussle.neighbors.kernels import row_of
 from tussle.numeric import atan2
 from tussle.numeric.kernel import device, kernel
+from tussle.numeric.neighbors.kernels import row_of
 from tussle.numeric.quaternion import quat_normalize, quat_rotate
 
 

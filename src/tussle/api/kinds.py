@@ -11,10 +11,10 @@ from tussle.api.group import GroupView
 from tussle.api.plugin import HistoricAttributes, Plugin
 from tussle.api.row_laws import step_rows
 from tussle.api.world import WorldView
-from tussle.columns import EntityRef, Output, Param
+from tussle.declare.columns import EntityRef, Output, Param
+from tussle.declare.messages import Messages
 from tussle.errors import DeclarationError
-from tussle.messages import Messages
-from tussle.scene import HeightField, TeamRegion, Volume
+from tussle.world.scene import HeightField, TeamRegion, Volume
 
 
 class EntityPlugin(Plugin):

@@ -12,11 +12,11 @@ import numpy as np
 
 from tussle.api.bodies import DERIVED, FLOATS, INTS, Bodies
 from tussle.api.group import GroupView
-from tussle.columns import Channel, Numbers, Param
+from tussle.declare.columns import Channel, Numbers, Param
 from tussle.errors import DeclarationError, listed, nearest_name
-from tussle.neighbors.index import Blocks, Index
-from tussle.neighbors.law import OTHER, PAIR, Law
-from tussle.neighbors.walk import make_walk
+from tussle.numeric.neighbors.index import Blocks, Index
+from tussle.numeric.neighbors.law import OTHER, PAIR, Law
+from tussle.numeric.neighbors.walk import make_walk
 from tussle.numeric.rk4 import label
 
 COMPONENTS = {3: "xyz", 4: "wxyz", 2: "xy"}

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from tussle.api.world import WorldView
-from tussle.messages import Messages
+from tussle.declare.messages import Messages
 from tussle.numeric.segments import order_by_row
 
 BLOCKS = ("nothing", "scene", "scene and entities")

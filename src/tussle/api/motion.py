@@ -15,7 +15,7 @@ from tussle.api.kinds import EntityPlugin
 from tussle.api.mass import MassProperties
 from tussle.api.range_kernel import RangeKernel
 from tussle.api.row_laws import BODY_INPUTS, advance_rows
-from tussle.columns import Channel, Param, State
+from tussle.declare.columns import Channel, Param, State
 from tussle.errors import DeclarationError, ParameterError, listed, nearest_name
 from tussle.numeric.paths import GRAVITY
 from tussle.numeric.quaternion import quat_from_euler

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 
 from tussle.api.bodies import Bodies, BodyView
+from tussle.declare.lists import Segments
 from tussle.errors import ParameterError
-from tussle.lists import Segments
-from tussle.neighbors import queries, search
-from tussle.neighbors.index import Index
+from tussle.numeric.neighbors import queries, search
+from tussle.numeric.neighbors.index import Index
 
 
 class Pairs(Segments):

@@ -13,7 +13,7 @@ import numpy as np
 
 from tussle.api.laws import NeighborLaw
 from tussle.api.row_laws import RowLaw
-from tussle.columns import (
+from tussle.declare.columns import (
     Children,
     Column,
     Handle,

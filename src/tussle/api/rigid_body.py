@@ -11,7 +11,7 @@ from tussle.api.bodies import DERIVED
 from tussle.api.laws import BODY
 from tussle.api.mass import MassProperties
 from tussle.api.motion import MotionBody, MotionModel
-from tussle.columns import Param, State
+from tussle.declare.columns import Param, State
 from tussle.errors import ParameterError
 from tussle.numeric.quaternion import quat_rotate_inverse
 from tussle.numeric.row_kernel import Number, RowCall

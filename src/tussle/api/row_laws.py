@@ -12,7 +12,7 @@ import numpy as np
 from tussle.api.bodies import DERIVED, FLOATS
 from tussle.api.group import ROWS_PER_THREAD, GroupView
 from tussle.api.laws import BODY, components
-from tussle.columns import Channel, Numbers, Output, Param, State
+from tussle.declare.columns import Channel, Numbers, Output, Param, State
 from tussle.errors import DeclarationError, listed, nearest_name
 from tussle.numeric.rk4 import label
 from tussle.numeric.row_kernel import (

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from tussle.api.kinds import Autonomy
-from tussle.columns import Param, State, Subscribe
-from tussle.messages import TextMessage
+from tussle.declare.columns import Param, State, Subscribe
+from tussle.declare.messages import TextMessage
 
 
 class StateFollower(Autonomy):

@@ -7,14 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from tussle import rng
 from tussle.api.bodies import IN_PLACE, Bodies, BodyView
 from tussle.api.context import Context
 from tussle.api.group import GOLDEN, LAWS, GroupView
 from tussle.api.mass import MassProperties
-from tussle.comms import TopicBuffer
+from tussle.declare.comms import TopicBuffer
+from tussle.declare.messages import Message, Messages
 from tussle.errors import MissionError, ParameterError, listed, nearest_name
-from tussle.messages import Message, Messages
+from tussle.numeric import rng
 
 
 class WorldBodies(BodyView):

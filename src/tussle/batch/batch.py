@@ -33,7 +33,7 @@ from tussle.batch.store import PLUGINS
 from tussle.batch.tasks import BatchRun, Finished
 from tussle.batch.variables import Variable
 from tussle.batch.varied import as_variables, variable_entry
-from tussle.displays import counted, line, listing, page, table
+from tussle.declare.displays import counted, line, listing, page, table
 from tussle.engine.simulation import Simulation
 from tussle.errors import BatchError, ParameterError, PluginError
 from tussle.mission import Loaded, Mission, PluginFile, read_mission

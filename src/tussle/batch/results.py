@@ -41,7 +41,7 @@ from tussle.batch.survival import N_TIMES, Survival, survival_of
 from tussle.batch.target import Answers, Layout, Target, answers_of, crossing_of
 from tussle.batch.variables import Variable
 from tussle.batch.varied import variable_of
-from tussle.displays import counted, line, listing, page, table
+from tussle.declare.displays import counted, line, listing, page, table
 from tussle.errors import ParameterError, listed
 from tussle.palette import colour_of, on_paper
 from tussle.record.run import check_frames, frame_of, load_run

@@ -12,7 +12,7 @@ import numpy as np
 
 from tussle.api import Plugin
 from tussle.batch.tasks import BatchRun, Finished, Heartbeat
-from tussle.columns import Handle
+from tussle.declare.columns import Handle
 from tussle.engine.result import WorldResult
 from tussle.engine.simulation import Simulation
 from tussle.errors import PluginError, TussleError

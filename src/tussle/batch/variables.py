@@ -13,10 +13,10 @@ from typing import Any
 
 import numpy as np
 
+from tussle.declare.units import LONGEST_TEXT, QUANTITY, unit_of
 from tussle.errors import ParameterError, UnitError, listed, nearest_name
 from tussle.mission.codecs import written
 from tussle.numeric import exp, log
-from tussle.units import LONGEST_TEXT, QUANTITY, unit_of
 
 Value = int | float | str | bool
 Point = dict[str, Value]

@@ -18,8 +18,8 @@ ONE_WORD = re.compile(r"[\w.+-]+", re.ASCII)
 
 def missions(incomplete: str) -> list[str]:
     """Names of shipped missions, and of plugins for their examples, that begin so; the shell adds files where there are none."""
-    from tussle import stock
     from tussle.mission import shipped_missions
+    from tussle.plugins import stock
 
     return beginning(
         incomplete, [*shipped_missions(), *(stock.examples() if incomplete[:1].isupper() else ())]
@@ -33,7 +33,7 @@ def plugins(incomplete: str) -> list[str]:
 
 def stock_plugins(incomplete: str) -> list[str]:
     """Names of stock plugins that begin so."""
-    from tussle import stock
+    from tussle.plugins import stock
 
     return beginning(incomplete, stock.manifest())
 

@@ -14,8 +14,8 @@ from typer.core import TyperCommand
 
 from tussle.cli import completion
 from tussle.cli.terminal import EXIT_CODES, OK, reported, say_note
+from tussle.declare.units import parse
 from tussle.errors import ParameterError
-from tussle.units import parse
 
 if TYPE_CHECKING:
     from tussle.mission import Loaded, Mission

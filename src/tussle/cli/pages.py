@@ -13,7 +13,6 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
-from tussle import stock
 from tussle.api import Plugin
 from tussle.cli.options import PluginOptions
 from tussle.cli.play import simulate
@@ -21,10 +20,11 @@ from tussle.cli.play_options import DescribeOptions, MissionsOptions
 from tussle.cli.progress import compiling
 from tussle.cli.tables import indented, text_table, title
 from tussle.cli.terminal import WRONG_INPUT, out, put, say_error, say_note
-from tussle.columns import Channel, Param, Publish
+from tussle.declare.columns import Channel, Param, Publish
 from tussle.engine.simulation import Simulation
 from tussle.errors import MissionError, nearest_name
 from tussle.mission import Catalogue, Mission, PluginFile, shipped_missions
+from tussle.plugins import stock
 
 NAME_WIDTH = 22
 KINDS = ("autonomy", "behavior", "controller", "motion", "sensor", "interaction", "network", "metric")

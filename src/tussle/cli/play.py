@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from tussle import documents, stock
+from tussle import documents
 from tussle.cli.interrupt import Interrupt
 from tussle.cli.options import MissionOptions
 from tussle.cli.play_options import ConvertOptions, RunOptions
@@ -26,10 +26,11 @@ from tussle.cli.progress import ProgressMeter, compiling
 from tussle.cli.summary import Speed, show_summary
 from tussle.cli.tables import text_table
 from tussle.cli.terminal import OK, WRONG_INPUT, out, say, say_error, say_note
-from tussle.displays import counted
+from tussle.declare.displays import counted
 from tussle.engine.simulation import Simulation
 from tussle.errors import BatchError, MissionError, ParameterError, RecordError, TussleError, WiringError
 from tussle.mission import Loaded, Mission, to_python, to_xml
+from tussle.plugins import stock
 from tussle.record.plugin_columns import select
 from tussle.record.schema import MISSION_FILE, RUN_FILE, TRAJECTORY_FILE
 

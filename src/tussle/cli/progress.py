@@ -132,7 +132,9 @@ def compiling() -> Iterator[None]:
             )
         if console.is_terminal:
             status.start()
-            status.update(Text(f"{len(names)}  {name.removeprefix('tussle.').removeprefix('stock.')}"))
+            status.update(
+                Text(f"{len(names)}  {name.removeprefix('tussle.').removeprefix('plugins.stock.')}")
+            )
 
     before, kernel.stats.on_compile = kernel.stats.on_compile, show
     try:

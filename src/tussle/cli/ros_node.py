@@ -42,7 +42,7 @@ def ros_node(options: RosNodeOptions) -> int:
         RosError: The master is not there or has gone.
     """
     from tussle.api import Autonomy
-    from tussle.bridges.ros_node import AutonomyHost, serve
+    from tussle.cli.bridges.ros_node import AutonomyHost, serve
     from tussle.mission import Catalogue
     from tussle.mission.plugin_files import load_plugin_file
 

@@ -14,14 +14,14 @@ from tussle.api import Plugin
 from tussle.cli.options import PluginOptions
 from tussle.cli.pages import allowed_text, default_text, first_sentence, load_plugins
 from tussle.cli.terminal import WRONG_INPUT, out, say_error
-from tussle.columns import Param
+from tussle.declare.columns import Param
+from tussle.declare.texts import FALSE, TRUE
+from tussle.declare.units import spellings
 from tussle.mission import tags
 from tussle.mission.catalogue import KINDS, historic
 from tussle.mission.laws import COMPAT
 from tussle.mission.scene_tags import BUILDING, TERRAIN, WALL
 from tussle.mission.spec import BLOCK_VALUES, END_CONDITIONS, MISSION_VALUES
-from tussle.texts import FALSE, TRUE
-from tussle.units import spellings
 
 XS = "http://www.w3.org/2001/XMLSchema"
 XINCLUDE = "http://www.w3.org/2001/XInclude"

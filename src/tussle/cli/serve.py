@@ -9,7 +9,7 @@ from tussle.cli.play import simulate
 from tussle.cli.play_options import ServeOptions
 from tussle.cli.progress import compiling
 from tussle.cli.terminal import OK, TERMINATED, out
-from tussle.serve import Server
+from tussle.view.serve import Server
 
 NAP = 0.1
 """Time between two looks for Ctrl-C [s]."""

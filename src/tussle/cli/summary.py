@@ -12,11 +12,11 @@ from rich.padding import Padding
 from tussle.cli.progress import times
 from tussle.cli.tables import fact_list, number_tables, title
 from tussle.cli.terminal import put
-from tussle.displays import number
+from tussle.declare.displays import number
 from tussle.engine.result import WorldResult
 from tussle.engine.simulation import Simulation
-from tussle.event_texts import end_text
 from tussle.mission import Mission
+from tussle.record.event_texts import end_text
 
 
 class Speed:

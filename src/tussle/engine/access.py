@@ -9,7 +9,7 @@ import numpy as np
 
 from tussle.api.bodies import BODY_UNITS, DERIVED, FLOATS, INTS, Bodies, derived_from
 from tussle.api.plugin import Plugin
-from tussle.columns import Numbers, Param, State
+from tussle.declare.columns import Numbers, Param, State
 from tussle.engine.group import Binding, Group
 from tussle.engine.state import SimulationState
 from tussle.engine.table import Stored, Table

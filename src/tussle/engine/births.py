@@ -8,13 +8,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from tussle import rng
 from tussle.api.bodies import Bodies
 from tussle.engine import kernels
 from tussle.engine.params import Overrides
 from tussle.errors import MissionError
 from tussle.mission import Block
-from tussle.rng import stream_key
+from tussle.numeric import rng
+from tussle.numeric.rng import stream_key
 
 POSITION, HEADING = (np.uint64(stream_key("birth", label)) for label in ("position", "heading"))
 VALUES = ("heading", "climb", "roll", "speed", "heading_variance", "health", "radius", "mass")

@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 
 from tussle.api.links import Links
-from tussle.comms import EVERYONE, SAME_ENTITY, TopicBuffer
+from tussle.declare.comms import EVERYONE, SAME_ENTITY, TopicBuffer
+from tussle.declare.messages import Messages, RemoveEntity, SpawnEntity
 from tussle.engine import failure
 from tussle.engine.state import SimulationState
 from tussle.engine.world_bindings import WorldBinding
 from tussle.errors import WiringError, listed, nearest_name
-from tussle.messages import Messages, RemoveEntity, SpawnEntity
 
 
 def deliver(state: SimulationState) -> None:

@@ -11,8 +11,15 @@ from tussle.api.bodies import Bodies
 from tussle.api.context import Context
 from tussle.api.links import Links
 from tussle.api.world import WorldView
-from tussle.comms.topic import Delivery, TopicBuffer
-from tussle.messages import EntityCaptured, EntityCollided, EntityHitGround, FlagCaptured, FlagTaken, Message
+from tussle.declare.comms.topic import Delivery, TopicBuffer
+from tussle.declare.messages import (
+    EntityCaptured,
+    EntityCollided,
+    EntityHitGround,
+    FlagCaptured,
+    FlagTaken,
+    Message,
+)
 from tussle.record import Events
 from tussle.record.events import BIRTH, CAPTURE, COLLISION, DEATH, END, FLAG, KINDS
 

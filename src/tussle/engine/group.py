@@ -16,7 +16,7 @@ from tussle.api.group import GroupView
 from tussle.api.motion import MotionBody
 from tussle.api.rigid_body import RigidBodyModel
 from tussle.api.wired import Wired
-from tussle.columns import (
+from tussle.declare.columns import (
     Channel,
     EntityRef,
     Handle,
@@ -26,7 +26,7 @@ from tussle.columns import (
     State,
     Subscribe,
 )
-from tussle.comms import Inbox, Publisher
+from tussle.declare.comms import Inbox, Publisher
 from tussle.engine.table import ColumnPlace, Table
 from tussle.engine.wiring import BELIEF, Link, Wiring, read_channels
 from tussle.errors import DeclarationError, ParameterError, WiringError, listed, nearest_name

@@ -6,11 +6,11 @@ import math
 
 import numpy as np
 
-from tussle import rng
 from tussle.api.bodies import Bodies
 from tussle.engine.births import HEADING, Births, Occupancy
+from tussle.numeric import rng
 from tussle.numeric.quaternion import quat_from_euler
-from tussle.rng import stream_key
+from tussle.numeric.rng import stream_key
 
 
 class HistoricBirths(Births):

@@ -7,7 +7,7 @@ import math
 from tussle.numeric import cos, sin
 from tussle.numeric.kernel import device, kernel
 from tussle.numeric.quaternion import quat_from_euler
-from tussle.rng import normal2, uniform2
+from tussle.numeric.rng import normal2, uniform2
 
 
 @device

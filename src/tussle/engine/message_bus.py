@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from tussle.comms import TopicBuffer
+from tussle.declare.comms import TopicBuffer
+from tussle.declare.lists import RaggedColumn
+from tussle.declare.messages import Message, Messages
 from tussle.errors import WiringError, listed, nearest_name
-from tussle.lists import RaggedColumn
-from tussle.messages import Message, Messages
-from tussle.stock import ALWAYS_THERE
+from tussle.plugins.stock import ALWAYS_THERE
 
 
 class MessageBus:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from tussle.api.plugin import Plugin
-from tussle.columns import Param
+from tussle.declare.columns import Param
 from tussle.errors import ParameterError
 from tussle.mission import Block, Mission, paths
 from tussle.mission.spec import WORLD_VALUES

@@ -14,16 +14,16 @@ from tussle.api.bodies import Bodies
 from tussle.api.context import Context
 from tussle.api.kinds import EntityPlugin
 from tussle.api.mass import MassProperties
-from tussle.columns import Param
+from tussle.declare.columns import Param
+from tussle.declare.lists import RaggedColumn
 from tussle.engine import failure, kernels
 from tussle.engine.group import Binding, Group
 from tussle.engine.params import Overrides
 from tussle.engine.table import span
 from tussle.errors import PluginError
-from tussle.lists import RaggedColumn
 from tussle.mission import Block
 from tussle.mission.spec import ONE_BY_ONE
-from tussle.scene import Scene
+from tussle.world.scene import Scene
 
 Params = list[tuple[int, Binding, str, Any]]
 """Block number, plugin, parameter name, and its value."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from tussle.engine.state import SimulationState
-from tussle.rng import stream_key
+from tussle.numeric.rng import stream_key
 
 DERIVED = np.uint64(stream_key("reseed"))
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
-from tussle.displays import MAX_TABLE, line, listing, number, page, table
+from tussle.declare.displays import MAX_TABLE, line, listing, number, page, table
 
 
 @dataclass

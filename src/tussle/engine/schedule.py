@@ -10,9 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from tussle import rng
 from tussle.api.kinds import WorldPlugin
-from tussle.columns import Subscribe
+from tussle.declare.columns import Subscribe
 from tussle.engine import failure
 from tussle.engine.delivery import deliver
 from tussle.engine.group import Binding, Group
@@ -25,7 +24,8 @@ from tussle.engine.world_bindings import WorldBinding
 from tussle.errors import PluginError
 from tussle.mission.cadence import Cadence, TimerCadence
 from tussle.mission.spec import SHUFFLED
-from tussle.rng import stream_key
+from tussle.numeric import rng
+from tussle.numeric.rng import stream_key
 
 ORDER = int(stream_key("update", "order"))
 

@@ -13,8 +13,9 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 
 from tussle.api.plugin import GRADES
-from tussle.columns import Handle
-from tussle.displays import counted, line, listing, page, table
+from tussle.declare.columns import Handle
+from tussle.declare.displays import counted, line, listing, page, table
+from tussle.declare.messages import Message, Messages
 from tussle.engine import access
 from tussle.engine.arrivals import reset, spawn_due
 from tussle.engine.reseed import renew_keys
@@ -25,7 +26,6 @@ from tussle.engine.snapshot import Snapshot, restore, snapshot, state_hash
 from tussle.engine.state import SimulationState
 from tussle.engine.step_end import remove_dead, world_result
 from tussle.errors import MissionError, ParameterError, PluginError
-from tussle.messages import Message, Messages
 from tussle.mission import GivenMission, Mission, mission_of
 from tussle.mission.spec import SHUFFLED
 

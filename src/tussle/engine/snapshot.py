@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from tussle.columns import EntityRef, Handle, Output, State
+from tussle.declare.columns import EntityRef, Handle, Output, State
 from tussle.engine.group import Binding, Group
 from tussle.engine.rows import rows_changed
 from tussle.engine.state import SimulationState

@@ -23,7 +23,7 @@ from tussle.engine.table import Stored
 from tussle.engine.world_bindings import WorldBinding
 from tussle.errors import PluginError
 from tussle.mission import Mission
-from tussle.stock import advise_controllers
+from tussle.plugins.stock import advise_controllers
 
 if TYPE_CHECKING:
     from tussle.record import FirstStates

@@ -12,7 +12,7 @@ from tussle.api.motion import WRITABLE, MotionModel
 from tussle.api.range_kernel import RANGE_STEP, RangeKernel
 from tussle.api.rigid_body import RIGID_BODY, TO_COLUMNS, RigidBodyModel
 from tussle.api.row_laws import Rows, laws_of
-from tussle.columns import Handle, Topic
+from tussle.declare.columns import Handle, Topic
 from tussle.engine.group import Binding, Group
 from tussle.numeric.row_kernel import BlockCall, Item, Number, RowCall, numbers_of
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from tussle.api.bodies import Bodies
 from tussle.api.world import WorldView
-from tussle.comms import Inbox, Publisher
+from tussle.declare.comms import Inbox, Publisher
 from tussle.engine.group import Binding, Group
 from tussle.engine.population import Population
 from tussle.engine.table import Table

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from tussle.columns import Numbers
+from tussle.declare.columns import Numbers
+from tussle.declare.lists import RaggedColumn
 from tussle.engine import kernels
-from tussle.lists import RaggedColumn
 
 DTYPES: dict[type, Any] = {float: np.float64, int: np.int64, bool: np.bool_}
 

@@ -6,8 +6,8 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from tussle import units
-from tussle.columns import Channel, Output
+from tussle.declare import units
+from tussle.declare.columns import Channel, Output
 from tussle.engine.table import ColumnPlace, Table
 from tussle.errors import WiringError, nearest_name
 

@@ -10,12 +10,12 @@ import numpy as np
 
 from tussle.api.bodies import read_only
 from tussle.api.world import WorldView
-from tussle.columns import Handle, Input, Output, Param, Publish, State, Subscribe
-from tussle.comms import Publisher
+from tussle.declare.columns import Handle, Input, Output, Param, Publish, State, Subscribe
+from tussle.declare.comms import Publisher
+from tussle.declare.lists import RaggedColumn
 from tussle.engine.params import Overrides
 from tussle.engine.table import ColumnPlace, Stored, Table
 from tussle.errors import DeclarationError, TussleError, WiringError
-from tussle.lists import RaggedColumn
 
 
 def offer(

@@ -11,12 +11,12 @@ from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from typing import Any
 
-from tussle import stock
 from tussle.api import Autonomy, Behavior, Controller, Interaction, Metric, MotionModel, Network, Sensor
 from tussle.api.plugin import Plugin
 from tussle.errors import MissionError, nearest_name
 from tussle.mission.laws import shipped
 from tussle.mission.plugin_files import PluginFile
+from tussle.plugins import stock
 
 KINDS: dict[str, type] = {
     "autonomy": Autonomy,

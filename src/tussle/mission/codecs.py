@@ -10,10 +10,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from tussle import texts, units
-from tussle.columns import MOST_INTEGER
+from tussle.declare import texts, units
+from tussle.declare.columns import MOST_INTEGER
+from tussle.declare.texts import shown
 from tussle.errors import MissionError, ParameterError
-from tussle.texts import shown
 
 RATIO = re.compile(r"\s*([-+.\deE]+)\s*/\s*([-+.\deE]+)\s*", re.ASCII)
 BEHAVIOR = re.compile(r"\s*\[\s*([^\s\[\]='\"]+)")

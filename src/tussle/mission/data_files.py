@@ -7,8 +7,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePath
 
+from tussle.declare.texts import shown
 from tussle.errors import MissingFileError
-from tussle.texts import shown
 
 VARIABLE = "SCRIMMAGE_DATA_PATH"
 """Environment variable with folders of data, separated as in PATH, which SCRIMMAGE's users have."""

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 from html import escape
 from typing import Any
 
-from tussle.displays import counted, line, listing, page, shortened, table
+from tussle.declare.displays import counted, line, listing, page, shortened, table
 from tussle.palette import colour_of
 
 SIZE, MARGIN = 220.0, 14.0

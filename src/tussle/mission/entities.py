@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from tussle.declare.texts import FALSE, shown, truth
 from tussle.errors import MissionError, TussleError
 from tussle.mission import codecs
 from tussle.mission.limits import Limits
@@ -18,8 +19,7 @@ from tussle.mission.plugin_tags import PluginReader, PluginTag
 from tussle.mission.problems import Place, Problems
 from tussle.mission.spec import BLOCK_VALUES, RUN, Block
 from tussle.mission.tags import BASE, ENTITY, ENTITY_ATTRIBUTES, MANY, TagSpec
-from tussle.scene import Base, Origin
-from tussle.texts import FALSE, shown, truth
+from tussle.world.scene import Base, Origin
 
 MOST_TEAM = 2**31 - 1
 

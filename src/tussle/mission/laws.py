@@ -6,9 +6,9 @@ from collections.abc import Callable, Iterable
 from functools import partial
 from typing import Any
 
-from tussle import stock
 from tussle.api.plugin import Plugin
 from tussle.errors import MissionError, nearest_name
+from tussle.plugins import stock
 
 COMPAT = ("scrimmage",)
 """Names of laws other than tussle's."""
@@ -34,7 +34,7 @@ def shipped(compat: str) -> dict[str, Callable[[], Any]]:
     check_compat(compat)
     if not compat:
         return {name: partial(stock.load, name) for name in stock.manifest()}
-    from tussle import historic  # loaded only on demand
+    from tussle.plugins import historic  # loaded only on demand
 
     return {name: partial(historic.load, name) for name in {**stock.manifest(), **historic.manifest()}}
 
@@ -53,7 +53,7 @@ def with_law(plugin: Plugin) -> Plugin:
 
     The plugins inside it are replaced likewise.
     """
-    from tussle import historic
+    from tussle.plugins import historic
 
     cls, values = type(plugin), plugin.stated
     values |= {name: tuple(map(with_law, values[name])) for name in plugin.children() if name in values}

@@ -6,6 +6,7 @@ from collections.abc import Collection, Iterable, Mapping
 from typing import Any
 
 from tussle.api.plugin import Plugin
+from tussle.declare.texts import shown
 from tussle.errors import MissionError, ParameterError, TussleError, listed, nearest_name
 from tussle.mission import codecs
 from tussle.mission.catalogue import Catalogue
@@ -16,7 +17,6 @@ from tussle.mission.plugin_tags import free_name
 from tussle.mission.spec import RUN
 from tussle.mission.tags import ENTITY, PLUGIN
 from tussle.mission.tags import RUN as RUN_ATTRIBUTES
-from tussle.texts import shown
 
 WORLD_PLUGINS = ("entity_interaction", "metrics", "network")
 ENTITY_PLUGINS = ("autonomy", "controller", "sensor", "motion_model")

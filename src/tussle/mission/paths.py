@@ -11,10 +11,10 @@ from dataclasses import fields
 from typing import Any, NamedTuple
 
 from tussle.api.plugin import RESERVED, Plugin
-from tussle.columns import Param
+from tussle.declare.columns import Param
+from tussle.declare.texts import shown
 from tussle.errors import ParameterError, TussleError, listed, nearest_name
 from tussle.mission.spec import BLOCK_VALUES, MISSION_VALUES, RUN, Block, Mission
-from tussle.texts import shown
 
 
 def follow(

@@ -23,9 +23,9 @@ from pathlib import Path, PurePosixPath
 from types import ModuleType
 from typing import Any
 
-from tussle import stock
 from tussle.api.plugin import Plugin
 from tussle.errors import MissionError
+from tussle.plugins import stock
 
 PREFIX = "tussle_plugins_"
 """Prefix of the package names of folders with plugin files."""
@@ -292,5 +292,5 @@ class _Loader(ExecutionLoader):
             found = builtins.__import__(f"{self.package}.{name}", globals, locals, fromlist)
             return found if fromlist else sys.modules[neighbour]
         if level == 0 and head == BINDINGS:
-            return importlib.import_module("tussle.stock.autonomy.py_autonomy.bindings")
+            return importlib.import_module("tussle.plugins.stock.autonomy.py_autonomy.bindings")
         return builtins.__import__(name, globals, locals, fromlist, level)

@@ -10,14 +10,14 @@ from pathlib import Path
 from typing import Any
 
 from tussle.api.plugin import Plugin
-from tussle.columns import Param
+from tussle.declare.columns import Param
+from tussle.declare.texts import shown
 from tussle.errors import MissionError, TussleError
 from tussle.mission import codecs
 from tussle.mission.catalogue import KINDS, AbsentPluginError, Catalogue, historic
 from tussle.mission.node import Budget, Node
 from tussle.mission.problems import Place, Problems
 from tussle.mission.tags import PLUGIN
-from tussle.texts import shown
 
 MOST_NESTED = 4
 """Maximum nesting of behaviors."""

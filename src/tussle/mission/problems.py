@@ -6,8 +6,8 @@ from collections.abc import Collection, Iterable
 from itertools import islice
 from typing import NamedTuple
 
+from tussle.declare.texts import LONGEST_SHOWN, shown
 from tussle.errors import MissionError, listed, nearest_name
-from tussle.texts import LONGEST_SHOWN, shown
 
 MOST_LINES = 100
 """Maximum number of errors, and of notes; a file with more is most likely not a mission."""

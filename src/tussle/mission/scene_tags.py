@@ -7,16 +7,16 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from tussle.declare.texts import shown
 from tussle.errors import MissionError, TussleError
 from tussle.mission import codecs
 from tussle.mission.data_files import DataFiles
 from tussle.mission.node import Node
 from tussle.mission.problems import Problems
 from tussle.mission.terrain_xml import read_terrain_xml
-from tussle.rays.files import MESHES, SUFFIXES, read_surface, read_texture
-from tussle.rays.mesh_parts import read_parts
-from tussle.scene import Cuboid, FlatGround, HeightField, Origin, Prism, TriangleMesh, Volume
-from tussle.texts import shown
+from tussle.world.rays.files import MESHES, SUFFIXES, read_surface, read_texture
+from tussle.world.rays.mesh_parts import read_parts
+from tussle.world.scene import Cuboid, FlatGround, HeightField, Origin, Prism, TriangleMesh, Volume
 
 SCENE_TAGS = ("terrain", "ground", "wall", "building")
 MOST_WALLS = 20_000

@@ -8,13 +8,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from tussle import stock
+from tussle.declare.texts import shown
 from tussle.documents import size_of
 from tussle.errors import MissionError, listed, nearest_name
 from tussle.mission.node import Budget, Node, parse
 from tussle.mission.placeholders import replace_placeholders
 from tussle.mission.problems import Place, Problems
-from tussle.texts import shown
+from tussle.plugins import stock
 
 LIBRARY = Path(__file__).parent / "library"
 XINCLUDE = "http://www.w3.org/2001/XInclude}"

@@ -11,16 +11,16 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from tussle import stock
 from tussle.api import Autonomy, Controller, Interaction, Metric, MotionModel, Network, Sensor
 from tussle.api.context import missing_service
-from tussle.columns import Param
+from tussle.declare.columns import Param
 from tussle.errors import MissionError, ParameterError, TussleError, listed, nearest_name
 from tussle.mission import displayed
 from tussle.mission.cadence import Cadence
 from tussle.mission.laws import check_compat, with_laws
 from tussle.mission.limits import Limits
-from tussle.scene import Scene, find_region
+from tussle.plugins import stock
+from tussle.world.scene import Scene, find_region
 
 T = TypeVar("T")
 

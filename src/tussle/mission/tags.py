@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from tussle import stock
+from tussle.plugins import stock
 
 
 class TagSpec(NamedTuple):

@@ -7,15 +7,15 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from tussle.declare.texts import shown
 from tussle.errors import MissionError, listed, nearest_name
-from tussle.geodesy import FLATTENING, SEMI_MAJOR, Origin
 from tussle.mission import codecs
 from tussle.mission.limits import Limits
 from tussle.mission.node import Budget, parse
 from tussle.mission.source import read_text
-from tussle.rays.files import read_surface
-from tussle.scene import HeightField, TriangleMesh
-from tussle.texts import shown
+from tussle.world.geodesy import FLATTENING, SEMI_MAJOR, Origin
+from tussle.world.rays.files import read_surface
+from tussle.world.scene import HeightField, TriangleMesh
 
 TAGS = (
     "polydata", "texture", "system", "hemisphere", "zone", "origin_offset_x", "origin_offset_y", "origin_offset_z", "extrusion",

@@ -7,8 +7,8 @@ import json
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from tussle import stock
 from tussle.api.plugin import Plugin
+from tussle.declare.texts import shown
 from tussle.errors import MissionError, ParameterError
 from tussle.mission import codecs
 from tussle.mission.entities import block_names
@@ -18,12 +18,17 @@ from tussle.mission.plugin_tags import RATED
 from tussle.mission.problems import Place
 from tussle.mission.spec import Block, Mission
 from tussle.mission.tags import BASE, ENTITY, RUN, SEED_ATTRIBUTES, WORLD, TagSpec
-from tussle.scene import Base, Cuboid, HeightField, Prism, Scene, TriangleMesh
-from tussle.texts import shown
+from tussle.plugins import stock
+from tussle.world.scene import Base, Cuboid, HeightField, Prism, Scene, TriangleMesh
 
 NOWHERE = Place("", 0)
-SHIPPED = ("tussle.stock", "tussle.historic")
-"""Packages from which plugins are imported by name."""
+HISTORIC = "tussle.plugins.historic."
+PUBLIC = {
+    "tussle.plugins.stock.": "tussle.stock",
+    HISTORIC: "tussle.historic",
+    "tussle.world.": "tussle.scene",
+}
+"""Public modules from which classes of these packages are imported by name."""
 COMPONENTS = {
     "position": ("x", "y", "z"),
     "velocity": ("vx", "vy", "vz"),
@@ -80,7 +85,7 @@ def to_xml(mission: GivenMission, seed: int | None = None) -> str:
     for name in ("latitude", "longitude", "altitude"):
         root.children.append(_value(f"{name}_origin", getattr(origin, name), WORLD))
     for plugin in () if mission.compat else (p for outer in mission.plugins for p in outer.walk()):
-        if type(plugin).__module__.startswith(f"{SHIPPED[1]}."):
+        if type(plugin).__module__.startswith(HISTORIC):
             raise MissionError(
                 f"mission: {plugin.instance_name} has the law of SCRIMMAGE, but the mission does not; give it compat='scrimmage'"
             )
@@ -278,11 +283,12 @@ def _code(value: Any, imports: dict[str, str]) -> list[str]:
         return [repr(value)]
     if isinstance(value, (HeightField, TriangleMesh)):
         raise MissionError(
-            f"mission: {value!r} cannot be written as code; write the mission without it, and read it with tussle.rays.files.read_surface"
+            f"mission: {value!r} cannot be written as code; write the mission without it, and "
+            "read it with tussle.world.rays.files.read_surface"
         )
     name = type(value).__name__
     module = "tussle" if isinstance(value, (Block, Mission)) else type(value).__module__
-    module = next((shipped for shipped in SHIPPED if module.startswith(f"{shipped}.")), module)
+    module = next((public for package, public in PUBLIC.items() if module.startswith(package)), module)
     if imports.setdefault(name, module) != module:
         raise MissionError(
             f"two classes are called {name}, in {imports[name]} and {module}; rename one of them"

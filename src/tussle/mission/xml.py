@@ -9,8 +9,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from tussle.declare.texts import shown, truth
 from tussle.errors import MissionError, ParameterError, TussleError
-from tussle.geodesy import Origin
 from tussle.mission import codecs
 from tussle.mission.catalogue import KINDS, Catalogue
 from tussle.mission.data_files import DataFiles, data_folders
@@ -29,8 +29,8 @@ from tussle.mission.spec import MISSION_VALUES, Mission, end_conditions
 from tussle.mission.stray_tags import report_stray
 from tussle.mission.strictness import strictness_of
 from tussle.mission.tags import RUN, RUNSCRIPT, SEED_ATTRIBUTES, WORLD, TagSpec
-from tussle.scene import Scene
-from tussle.texts import shown, truth
+from tussle.world.geodesy import Origin
+from tussle.world.scene import Scene
 
 SEED = re.compile(r"\d{1,20}", re.ASCII)
 PLUGIN_TAGS = {"entity_interaction": "interactions", "metrics": "metrics", "network": "networks"}

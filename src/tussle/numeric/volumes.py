@@ -1,6 +1,6 @@
 """Kernels of convex volumes and spheres: who is inside, and who was on a straight way.
 
-They compute, point by point, what `tussle.shapes` says for arrays, and skip what cannot change the result.
+They compute, point by point, what `tussle.world.shapes` says for arrays, and skip what cannot change the result.
 """
 
 from __future__ import annotations

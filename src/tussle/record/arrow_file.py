@@ -8,7 +8,7 @@ from pathlib import Path
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from tussle.displays import counted
+from tussle.declare.displays import counted
 from tussle.errors import TussleError
 from tussle.record.arrow_blocks import SCHEMA, InvalidStreamError, StreamBlocks, find_blocks
 from tussle.record.plugin_columns import is_of_plugin

@@ -10,7 +10,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
-from tussle.displays import counted
+from tussle.declare.displays import counted
 from tussle.documents import size_of
 from tussle.errors import TussleError
 from tussle.record.arrow_file import same_columns

@@ -11,8 +11,8 @@ import numpy as np
 import pyarrow as pa
 
 from tussle.api.plugin import Plugin
-from tussle.columns import EntityRef, Numbers, Output, State
-from tussle.displays import listing
+from tussle.declare.columns import EntityRef, Numbers, Output, State
+from tussle.declare.displays import listing
 from tussle.errors import ParameterError, nearest_name
 from tussle.mission import Block, Mission, paths
 

@@ -12,7 +12,7 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.csv
 
-from tussle.displays import MAX_LINE, counted, line, listing, page, shortened, table
+from tussle.declare.displays import MAX_LINE, counted, line, listing, page, shortened, table
 from tussle.documents import DAMAGED, MOST_BYTES, read_text
 from tussle.errors import MissingExtraError, ParameterError, RecordError, listed, nearest_name
 from tussle.mission.limits import Limits

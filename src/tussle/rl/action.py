@@ -12,7 +12,7 @@ from gymnasium import spaces
 
 from tussle.api import Autonomy, GroupView, Output
 from tussle.api.kinds import EntityPlugin
-from tussle.columns import Param
+from tussle.declare.columns import Param
 from tussle.errors import ParameterError, listed, nearest_name
 from tussle.mission import Block
 from tussle.rl import kernels

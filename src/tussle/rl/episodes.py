@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from tussle import rng
 from tussle.batch.variables import Choice, Range
 from tussle.engine.params import Overrides
 from tussle.errors import ParameterError
+from tussle.numeric import rng
 from tussle.rl.draws import extremes, named
 from tussle.rl.task import Task
 

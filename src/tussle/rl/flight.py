@@ -10,10 +10,10 @@ from typing import Any
 import gymnasium
 import numpy as np
 
-from tussle import rng
 from tussle.api import GroupView
 from tussle.documents import read_bytes
 from tussle.errors import MissingExtraError, ParameterError, listed, nearest_name
+from tussle.numeric import rng
 from tussle.rl.action import Actor, Decoder, learned
 from tussle.rl.computed import Computed
 from tussle.rl.observation import AgentRows

@@ -9,12 +9,12 @@ import numpy as np
 
 from tussle.engine.simulation import Simulation
 from tussle.mission import Block, Mission
+from tussle.plugins.stock import MotorSchemas, MoveToGoalMS, Predator, SingleIntegrator
 from tussle.rl.action import Act
 from tussle.rl.computed import Computed
 from tussle.rl.observation import NearestOthers, Own
 from tussle.rl.reward import Situation, Term, alive, captured, captures, closing
 from tussle.rl.task import Task
-from tussle.stock import MotorSchemas, MoveToGoalMS, Predator, SingleIntegrator
 
 RADIUS = 2.0
 """Distance along x below which robots are near [m]."""

@@ -12,12 +12,12 @@ from typing import Any
 
 import numpy as np
 
-from tussle.neighbors.kernels import rank_bits
-from tussle.neighbors.lane_count import LANES
-from tussle.neighbors.nearest_lanes import NONE, find_nearest
-from tussle.neighbors.search import TABLE, in_range, nearest_places, table_of
 from tussle.numeric import atan2
 from tussle.numeric.kernel import kernel, lean_device
+from tussle.numeric.neighbors.kernels import rank_bits
+from tussle.numeric.neighbors.lane_count import LANES
+from tussle.numeric.neighbors.nearest_lanes import NONE, find_nearest
+from tussle.numeric.neighbors.search import TABLE, in_range, nearest_places, table_of
 
 SCALAR, PLANE, SPACE, DISTANCE, SAME_TEAM, PRESENT, FORWARD, DIRECTION = range(8)
 """Kinds of features: a number, a vector of two or three numbers, and what is known of a neighbour; the direction of the nose; the

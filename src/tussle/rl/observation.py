@@ -13,10 +13,10 @@ import numpy as np
 
 from tussle.api.bodies import FLOATS, OFFSETS
 from tussle.errors import ParameterError, listed, nearest_name
-from tussle.neighbors.index import padded
-from tussle.neighbors.lane_count import LANES
-from tussle.neighbors.search import ANY, DIFFERENT, SAME
 from tussle.numeric.kernel import kernel
+from tussle.numeric.neighbors.index import padded
+from tussle.numeric.neighbors.lane_count import LANES
+from tussle.numeric.neighbors.search import ANY, DIFFERENT, SAME
 from tussle.rl import kernels
 
 if TYPE_CHECKING:
@@ -262,7 +262,7 @@ class Own(Component):
 
 def _column_of(block: Any, path: str) -> int:
     """Number of components of a plugin's column."""
-    from tussle.columns import Numbers
+    from tussle.declare.columns import Numbers
 
     plugin, _, name = path.partition(".")
     plugins = {p.instance_name: p for p in block.plugins}

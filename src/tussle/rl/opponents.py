@@ -7,15 +7,15 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from tussle import rng
 from tussle.errors import ParameterError, listed
 from tussle.mission import Mission
+from tussle.numeric import rng
+from tussle.plugins.stock import Learned
 from tussle.rl.action import Actor, learned
 from tussle.rl.flight import MOST_POLICIES, registered_task, registered_tasks
 from tussle.rl.policy_file import write_policy
 from tussle.rl.swarm import task_of
 from tussle.rl.task import Task
-from tussle.stock import Learned
 
 PAST = rng.stream_key("tussle.rl", "past")
 PAST_EVERY = 10

@@ -7,11 +7,7 @@ from typing import Any
 import numpy as np
 
 from tussle.mission import Block, Mission
-from tussle.rl.action import Act
-from tussle.rl.observation import NearestOthers, Own, Sectors
-from tussle.rl.reward import Situation, Term, died
-from tussle.rl.task import Task
-from tussle.stock import (
+from tussle.plugins.stock import (
     AvoidEntityMS,
     Boids,
     GoTo,
@@ -25,6 +21,10 @@ from tussle.stock import (
     Unicycle,
     UnicyclePID,
 )  # fmt: skip
+from tussle.rl.action import Act
+from tussle.rl.observation import NearestOthers, Own, Sectors
+from tussle.rl.reward import Situation, Term, died
+from tussle.rl.task import Task
 
 GOAL = (100.0, 0.0, 0.0)
 """Goal of `FindWay` [m]."""

@@ -9,11 +9,7 @@ import numpy as np
 
 from tussle.api import Interaction, Param, neighbors
 from tussle.mission import Block, Mission
-from tussle.rl.action import Act
-from tussle.rl.observation import NearestOthers, Own
-from tussle.rl.reward import Situation, Term, captured, captures, closing, died
-from tussle.rl.task import Task
-from tussle.stock import (
+from tussle.plugins.stock import (
     Boundary,
     BoundaryDefense,
     CaptureInBoundaryInteraction,
@@ -23,6 +19,10 @@ from tussle.stock import (
     TakeFlag,
     Unicycle,
 )  # fmt: skip
+from tussle.rl.action import Act
+from tussle.rl.observation import NearestOthers, Own
+from tussle.rl.reward import Situation, Term, captured, captures, closing, died
+from tussle.rl.task import Task
 
 FLAG_RADIUS = 10.0
 """Distance from the flag at which it is taken [m]."""

@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from tussle import units
 from tussle.api import Interaction, Metric, MotionModel, Plugin
 from tussle.api.motion import WRITABLE
-from tussle.columns import Column, Input, Numbers, Output, Param, State
+from tussle.declare import units
+from tussle.declare.columns import Column, Input, Numbers, Output, Param, State
 from tussle.engine.wiring import BELIEF
 from tussle.errors import ConformanceError, TussleError, listed
 

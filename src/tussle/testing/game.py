@@ -19,11 +19,11 @@ from tussle.api import (
     Sensor,
     WorldPlugin,
 )
-from tussle.columns import Channel, Topic
+from tussle.declare.columns import Channel, Topic
 from tussle.engine.simulation import Simulation
 from tussle.engine.wiring import BELIEF, read_channels, sharing, written_channels
 from tussle.mission import Block, Mission
-from tussle.stock import ALWAYS_THERE, GlobalNetwork, MotorSchemas
+from tussle.plugins.stock import ALWAYS_THERE, GlobalNetwork, MotorSchemas
 from tussle.testing.partners import (
     Driver,
     KitMessage,

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from tussle.api import PositiveParam
-from tussle.columns import MAX_NUMBER, Handle, Param
+from tussle.declare.columns import MAX_NUMBER, Handle, Param
 from tussle.engine.simulation import Simulation
 from tussle.errors import ConformanceError, MissionError, ParameterError, PluginError
 from tussle.testing.game import ConformanceGame

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from tussle.api.bodies import FLOATS, STORED_INTS
-from tussle.columns import Column, Output, State
+from tussle.declare.columns import Column, Output, State
 from tussle.engine.simulation import Simulation
 from tussle.engine.table import ColumnPlace, Table
 

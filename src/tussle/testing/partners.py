@@ -29,7 +29,7 @@ from tussle.api import (
     Subscribe,
     WorldView,
 )
-from tussle.columns import Channel, Numbers
+from tussle.declare.columns import Channel, Numbers
 from tussle.numeric.quaternion import quat_from_euler
 
 AMPLITUDES = {"m": 40.0, "m/s": 8.0, "rad": 1.0, "rad/s": 0.8, "m/s^2": 3.0}

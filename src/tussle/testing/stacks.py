@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from tussle.columns import Handle
+from tussle.declare.columns import Handle
 from tussle.engine.simulation import Simulation
 from tussle.testing.game import SEEDS, STEPS, ConformanceGame
 from tussle.testing.traces import Traces

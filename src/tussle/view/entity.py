@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 
 from tussle.api.bodies import BODY_UNITS, DERIVED, FLOATS, derive
-from tussle.columns import Column, Numbers, Param, Subscribe
-from tussle.comms import EVERYONE, SAME_ENTITY
-from tussle.comms.topic import Delivery, TopicBuffer
+from tussle.declare.columns import Column, Numbers, Param, Subscribe
+from tussle.declare.comms import EVERYONE, SAME_ENTITY
+from tussle.declare.comms.topic import Delivery, TopicBuffer
+from tussle.declare.lists import RaggedColumn
 from tussle.engine.group import Group
 from tussle.engine.simulation import Simulation
 from tussle.engine.table import Stored, Table
-from tussle.lists import RaggedColumn
 
 _COMPONENTS = {3: ("x", "y", "z"), 4: ("w", "x", "y", "z")}
 """Names of the components of a vector and of a quaternion."""

@@ -10,11 +10,11 @@ from typing import Any, Self
 
 import numpy as np
 
+from tussle.declare.messages import CustomKeyPress, Message, WorldPointClicked
 from tussle.engine.result import WorldResult
 from tussle.engine.simulation import Simulation
 from tussle.engine.step_end import world_result
 from tussle.errors import ParameterError, PluginError
-from tussle.messages import CustomKeyPress, Message, WorldPointClicked
 from tussle.view.curves import GameCurves
 from tussle.view.drawn import DrawCollector, Shape
 from tussle.view.entity import EntityState, entity_state

@@ -10,8 +10,8 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
+from tussle.declare.messages import Message
 from tussle.errors import PluginError, TussleError
-from tussle.messages import Message
 from tussle.view.drawn import DrawCollector
 from tussle.view.pacing import Pace, Speedometer
 from tussle.view.player import Player

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from tussle.declare.messages import Message, Messages
 from tussle.engine.simulation import Simulation
-from tussle.messages import Message, Messages
 from tussle.record import Events
 from tussle.view.curves import GameCurves
 from tussle.view.frame import Event, frame_of

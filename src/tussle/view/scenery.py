@@ -10,13 +10,23 @@ from typing import Any
 import numpy as np
 
 from tussle.errors import TussleError
-from tussle.geodesy import Origin
 from tussle.mission import Block, GivenMission, Mission, mission_of
-from tussle.rays.surfaces import MeshPart
-from tussle.scene import Base, Cuboid, HeightField, Plane, Polyhedron, Prism, Sphere, TriangleMesh, Volume
 from tussle.view.shapes import Mesh
 from tussle.view.solids import MOST_FACES, mesh_of, outline_of
 from tussle.view.terrain import Terrain
+from tussle.world.geodesy import Origin
+from tussle.world.rays.surfaces import MeshPart
+from tussle.world.scene import (
+    Base,
+    Cuboid,
+    HeightField,
+    Plane,
+    Polyhedron,
+    Prism,
+    Sphere,
+    TriangleMesh,
+    Volume,
+)
 
 LEAST_EXTENT = 50.0
 """Least width of the visible box [m]."""

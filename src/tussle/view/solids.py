@@ -6,8 +6,8 @@ from itertools import combinations
 
 import numpy as np
 
-from tussle.scene import Convex, FlatGround, Plane, Prism, Sphere, TriangleMesh, Volume
 from tussle.view.shapes import Mesh, ball
+from tussle.world.scene import Convex, FlatGround, Plane, Prism, Sphere, TriangleMesh, Volume
 
 MOST_FACES = 100_000
 """Triangles of a mesh that are drawn."""

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tussle.rays.surfaces import MeshPart
-from tussle.scene import HeightField
 from tussle.view.shapes import Mesh
+from tussle.world.rays.surfaces import MeshPart
+from tussle.world.scene import HeightField
 
 MOST_DRAWN = 40_000
 """Largest number of heights that are drawn: 80,000 triangles."""

@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 
 from tussle.api.bodies import FLOATS, OFFSETS
-from tussle.comms.topic import Delivery
+from tussle.declare.comms.topic import Delivery
+from tussle.declare.lists import RaggedColumn
+from tussle.declare.messages import Messages
 from tussle.engine.simulation import Simulation
 from tussle.engine.snapshot import Snapshot
 from tussle.engine.state import Parked
 from tussle.engine.table import Stored
 from tussle.errors import SnapshotError
-from tussle.lists import RaggedColumn
-from tussle.messages import Messages
 from tussle.view.frame import Frame, Lens
 from tussle.view.pacing import Allowance
 

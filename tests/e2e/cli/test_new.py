@@ -10,10 +10,11 @@ import needs
 import pytest
 from cli_process import environment
 
-from tussle import Simulation, stock
+from tussle import Simulation
 from tussle.cli.scaffold import EASY_KINDS, KINDS, write_plugin
 from tussle.errors import PluginError
 from tussle.mission import load_plugin_file, read_mission
+from tussle.plugins import stock
 
 PLUGINS = [
     *(("Plain", kind, ()) for kind in KINDS),

@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 
 import tussle as package
-from tussle import stock
 from tussle.cli import pages, terminal
 from tussle.mission import shipped_missions
+from tussle.plugins import stock
 
 
 def test_the_version(tussle):

@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 from tussle.batch.points import settings_of
 from tussle.batch.sampling import sample
 from tussle.batch.variables import Choice, Range, parse_variable
+from tussle.declare.units import parse
 from tussle.errors import ParameterError
 from tussle.mission.codecs import written
-from tussle.units import parse
 
 DRAWN = ("lhs", "sobol", "saltelli", "product")
 SEEDS = st.integers(0, 2**32)

@@ -13,7 +13,7 @@ from onlookers import pushed_flocks, radius_at, watched
 
 from tussle import Recorder, Simulation, load_run
 from tussle.api import bodies
-from tussle.neighbors.index import next_size
+from tussle.numeric.neighbors.index import next_size
 
 STEPS = 220
 EVERY = 20

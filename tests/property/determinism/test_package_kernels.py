@@ -119,20 +119,23 @@ def test_moved_copy_and_comments_compile_nothing(edited, plain):
 @pytest.mark.slow
 def test_constant_of_the_sine_reaches_all_that_turns_or_draws(new_keys):
     is_new = new_keys("numeric/elementary.py", "8.33333333332248946124e-03", "8.33333333e-03")
-    assert {"tussle.stock.motion.unicycle.kernels.pitched", "tussle.rng.fill_normal"} <= is_new[True]
-    assert not [name for name in is_new[True] if name.startswith("tussle.neighbors")]
+    assert {
+        "tussle.plugins.stock.motion.unicycle.kernels.pitched",
+        "tussle.numeric.rng.fill_normal",
+    } <= is_new[True]
+    assert not [name for name in is_new[True] if name.startswith("tussle.numeric.neighbors")]
     assert is_new[False]
 
 
 @pytest.mark.slow
 def test_code_generator_of_the_lanes_reaches_the_laws_that_use_lanes(edited, plain):
-    after = edited("neighbors/lanes_codegen.py", '(operator.sub, "fsub")', '(operator.sub, "fadd")')
+    after = edited("numeric/neighbors/lanes_codegen.py", '(operator.sub, "fsub")', '(operator.sub, "fadd")')
     assert after["hash"] != plain["hash"]
     assert any(".Boids.mates+" in name for name in after["made"])
     assert not [
         name
         for name in after["made"]
-        if name.startswith(("tussle.stock.motion", "tussle.rng", "tussle.numeric"))
+        if name.startswith(("tussle.plugins.stock.motion", "tussle.numeric.rng", "tussle.numeric"))
     ]
     assert after["loaded"] > len(after["made"])
 
@@ -140,15 +143,17 @@ def test_code_generator_of_the_lanes_reaches_the_laws_that_use_lanes(edited, pla
 @pytest.mark.slow
 def test_callee_of_one_motion_model_reaches_no_other_module(edited, plain):
     head = 'def clamp(value, limit):\n    """Value clamped to [-limit, limit]."""\n'
-    after = edited("stock/motion/unicycle/kernels.py", head, f"{head}    value = 0.5 * value\n")
+    after = edited("plugins/stock/motion/unicycle/kernels.py", head, f"{head}    value = 0.5 * value\n")
     assert after["hash"] != plain["hash"]
     assert after["made"]
-    assert {name.rsplit(".", 1)[0] for name in after["made"]} == {"tussle.stock.motion.unicycle.kernels"}
+    assert {name.rsplit(".", 1)[0] for name in after["made"]} == {
+        "tussle.plugins.stock.motion.unicycle.kernels"
+    }
 
 
 @pytest.mark.slow
 def test_round_of_the_random_numbers_reaches_the_draws_only(new_keys):
-    is_new = new_keys("rng.py", "mix(a, b, np.uint64(42))", "mix(a, b, np.uint64(43))")
-    drawing = {name for name in is_new[True] if not name.startswith("tussle.rng.")}
+    is_new = new_keys("numeric/rng.py", "mix(a, b, np.uint64(42))", "mix(a, b, np.uint64(43))")
+    drawing = {name for name in is_new[True] if not name.startswith("tussle.numeric.rng.")}
     assert drawing == {"tussle.engine.kernels.place_newborn", "tussle.engine.kernels.scatter"}
     assert is_new[False]

@@ -12,7 +12,7 @@ sys.path.insert(0, str(Path(__file__).parents[2] / "golden"))
 
 from golden_plugins import Beacon, Car, Nursery, Wanderer
 
-from tussle import Block, Mission, stock
+from tussle import Block, Mission
 from tussle.api import (
     Autonomy,
     Behavior,
@@ -27,6 +27,7 @@ from tussle.api import (
     Plugin,
     Sensor,
 )
+from tussle.plugins import stock
 
 KINDS = (Behavior, Autonomy, Controller, MotionModel, Sensor, Interaction, Metric, Network)
 ON_FILES = ("GraphInteraction", "MapGen2D", "TrajectoryRecordPlayback")

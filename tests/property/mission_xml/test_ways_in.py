@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from tussle import Simulation
 from tussle.batch import Batch, Choice
 from tussle.batch.variables import parse_variable
-from tussle.columns import MAX_NUMBER
+from tussle.declare.columns import MAX_NUMBER
 from tussle.errors import ParameterError
 from tussle.mission import codecs, read_mission, to_xml
 from tussle.mission.paths import with_value

@@ -7,10 +7,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tussle.numeric.quaternion import quat_rotate
-from tussle.stock.motion.simple_aircraft import SimpleAircraft
-from tussle.stock.motion.simple_aircraft import kernels as aircraft
-from tussle.stock.motion.unicycle import Unicycle
-from tussle.stock.motion.unicycle import kernels as unicycle
+from tussle.plugins.stock.motion.simple_aircraft import SimpleAircraft
+from tussle.plugins.stock.motion.simple_aircraft import kernels as aircraft
+from tussle.plugins.stock.motion.unicycle import Unicycle
+from tussle.plugins.stock.motion.unicycle import kernels as unicycle
 
 UNICYCLE, AIRCRAFT = Unicycle().advance, SimpleAircraft().advance
 angle = st.floats(-math.pi, math.pi)

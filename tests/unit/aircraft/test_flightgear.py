@@ -13,8 +13,8 @@ from tussle import Block, Mission, Simulation
 from tussle.aircraft.compile import compile_aircraft
 from tussle.aircraft.initial import place, run_initial
 from tussle.errors import ParameterError
+from tussle.plugins.stock.motion.jsbsim_compiled.flightgear import PROPERTIES, TIME, packets, send
 from tussle.stock import AircraftPIDController, JSBSimCompiled, Straight
-from tussle.stock.motion.jsbsim_compiled.flightgear import PROPERTIES, TIME, packets, send
 
 DT = 1.0 / 120.0
 FIELDS = (

@@ -9,9 +9,9 @@ import pytest
 
 from tussle import Block, Mission, Simulation
 from tussle.numeric.dryden import any_altitude
+from tussle.plugins.stock.motion.jsbsim_compiled.flying import FOOT, GUSTS, SLOTS
+from tussle.plugins.stock.motion.jsbsim_compiled.plugin import GUST
 from tussle.stock import AircraftPIDController, JSBSimCompiled, Straight, examples
-from tussle.stock.motion.jsbsim_compiled.flying import FOOT, GUSTS, SLOTS
-from tussle.stock.motion.jsbsim_compiled.plugin import GUST
 
 HAWK = str(examples()["JSBSimModel"].with_name("hawk"))
 SPEED = 24.0

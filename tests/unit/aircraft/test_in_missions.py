@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from tussle import Block, Mission, Simulation
+from tussle.plugins.stock.motion.jsbsim_compiled.plugin import ROWS_PER_THREAD
 from tussle.stock import (
     AircraftPIDController,
     JSBSimCompiled,
@@ -15,7 +16,6 @@ from tussle.stock import (
     Straight,
     examples,
 )
-from tussle.stock.motion.jsbsim_compiled.plugin import ROWS_PER_THREAD
 
 HAWK = str(examples()["JSBSimModel"].with_name("hawk"))
 CONTROL = {

@@ -25,7 +25,7 @@ from tussle.api import (
     State,
     Subscribe,
 )
-from tussle.columns import Field
+from tussle.declare.columns import Field
 from tussle.errors import DeclarationError, ParameterError, PluginError
 from tussle.numeric import total
 from tussle.stock import SingleIntegrator

@@ -10,10 +10,10 @@ from law_plugins import Every, play
 from tussle import Block, Mission, Simulation
 from tussle.api import Autonomy, Interaction, Param, State, neighbors, together
 from tussle.errors import DeclarationError, PluginError
-from tussle.neighbors.lane_code import lane_code
-from tussle.neighbors.lanes import load, number, store
 from tussle.numeric import atan2, sincos
 from tussle.numeric.kernel import device, kernel
+from tussle.numeric.neighbors.lane_code import lane_code
+from tussle.numeric.neighbors.lanes import load, number, store
 from tussle.stock import Still
 
 LIMIT = 3

@@ -11,6 +11,7 @@ from tussle.api import Autonomy, Controller, Input, MotionModel, Output, Param, 
 from tussle.errors import DeclarationError, PluginError
 from tussle.numeric.kernel import device
 from tussle.numeric.quaternion import quat_from_euler
+from tussle.plugins.stock.motion.unicycle.kernels import attitude
 from tussle.stock import (
     NoisyState,
     SimpleAircraft,
@@ -20,7 +21,6 @@ from tussle.stock import (
     Unicycle3D,
     UnicyclePID,
 )
-from tussle.stock.motion.unicycle.kernels import attitude
 
 PLANS = "desired_heading desired_altitude desired_speed"
 

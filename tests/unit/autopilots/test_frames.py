@@ -11,10 +11,10 @@ from autopilot_peers import LONG, JsonServant, free_ports
 
 from tussle import Block, Mission, Simulation
 from tussle.api import Input, MotionModel, Param, State
-from tussle.autopilots.frames import to_frd, to_ned, to_ned_frd
 from tussle.numeric.quaternion import quat_from_euler
+from tussle.plugins.links.autopilots.frames import to_frd, to_ned, to_ned_frd
+from tussle.plugins.stock.autonomy.px4.sensors import atmosphere, limited, to_body
 from tussle.stock import ArduPilot, DirectController
-from tussle.stock.autonomy.px4.sensors import atmosphere, limited, to_body
 
 G = 9.80665
 

@@ -19,9 +19,9 @@ from autopilot_peers import LONG, Process, Thread, example, free_ports
 
 from tussle import Block, Mission, Simulation
 from tussle.errors import MissingExtraError, ParameterError, PluginError
+from tussle.plugins.stock.autonomy.px4.link import Px4Link
 from tussle.scene import Scene
 from tussle.stock import PX4, DirectController, Multirotor
-from tussle.stock.autonomy.px4.link import Px4Link
 
 pytest.importorskip("pymavlink")
 PEER_OF_EXAMPLES = example("px4_peer")
@@ -457,7 +457,7 @@ def test_a_second_px4_finds_nobody_and_the_first_flies_on():
 
 
 def test_a_px4_that_reads_nothing_is_told(monkeypatch):
-    monkeypatch.setattr("tussle.stock.autonomy.px4.link.MOST_BYTES", 4096)
+    monkeypatch.setattr("tussle.plugins.stock.autonomy.px4.link.MOST_BYTES", 4096)
     port = tcp_port()
     mission = copter(port, lockstep=False, time_warp=1000.0, dt=0.01, end=1e6)
     stop = threading.Event()

@@ -13,10 +13,11 @@ import numpy as np
 import pytest
 from actor_process import actor_server
 
-from tussle import Simulation, stock
+from tussle import Simulation
 from tussle.errors import MissingExtraError, ParameterError, PluginError
 from tussle.mission import read_mission
-from tussle.rpc import load_grpc, message_types
+from tussle.plugins import stock
+from tussle.plugins.links.rpc import load_grpc, message_types
 
 MISSION = """<runscript><run dt="0.1" end="50"/>
 <entity_interaction ip="127.0.0.1" port="{port}">GRPCCommandString</entity_interaction>
@@ -110,7 +111,7 @@ def test_it_is_no_error_that_an_entity_is_gone(game, send):
 
 
 def test_more_commands_than_a_step_takes_are_refused(game, send, monkeypatch):
-    monkeypatch.setattr("tussle.stock.interaction.grpc_command_string.plugin.MOST_WAITING", 2)
+    monkeypatch.setattr("tussle.plugins.stock.interaction.grpc_command_string.plugin.MOST_WAITING", 2)
     with Simulation(game):
         answers = send(*[("GlobalNetwork", "Event", "go")] * 3)
     assert answers == ["1", "1", "RESOURCE_EXHAUSTED 2 commands wait for the next step"]
@@ -226,7 +227,7 @@ def test_an_error_of_the_server_is_told(actors, tmp_path, port):
 
 
 def test_a_server_that_is_not_there_is_named(tmp_path, port, monkeypatch):
-    monkeypatch.setattr("tussle.stock.autonomy.rl_simple.remote.TIMEOUT", 0.2)
+    monkeypatch.setattr("tussle.plugins.stock.autonomy.rl_simple.remote.TIMEOUT", 0.2)
     with (
         Simulation(robot(tmp_path, port)) as sim,
         pytest.raises(

@@ -16,14 +16,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tussle import Block, Mission, Simulation, stock
+from tussle import Block, Mission, Simulation
 from tussle.api import EasyAutonomy, Output, Param
 from tussle.errors import MissionError, ParameterError, PluginError
 from tussle.mission import read_mission
 from tussle.numeric.quaternion import quat_normalize
+from tussle.plugins import stock
+from tussle.plugins.stock.interaction.dis import pdu
 from tussle.scene import Origin, Scene
 from tussle.stock import DIS, External, Unicycle
-from tussle.stock.interaction.dis import pdu
 
 ORIGIN = Origin.from_degrees(35.721025, -120.767925, 100.0)
 DEACTIVATED = 1 << 23
@@ -557,7 +558,7 @@ def test_a_port_that_is_taken_is_named_and_one_that_is_left_is_free():
 
 def test_the_clock_is_waited_for(monkeypatch):
     waits = []
-    monkeypatch.setattr("tussle.stock.interaction.dis.link.time.sleep", waits.append)
+    monkeypatch.setattr("tussle.plugins.stock.interaction.dis.link.time.sleep", waits.append)
     with Simulation(mission(time_warp=1.0)) as sim:
         sim.step(5)
     assert waits

@@ -10,10 +10,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tussle import Block, Mission, Simulation, stock
+from tussle import Block, Mission, Simulation
 from tussle.errors import ParameterError, PluginError
 from tussle.mission import read_mission
 from tussle.numeric.quaternion import quat_from_euler, quat_rotate
+from tussle.plugins import stock
 from tussle.scene import Origin, Scene
 from tussle.stock import External, FlightGearMultiplayer
 

@@ -7,13 +7,13 @@ from xml.sax.saxutils import quoteattr
 
 import pytest
 
-from tussle import stock
 from tussle.cli.pages import load_plugins
 from tussle.cli.schema import mission_schema
 from tussle.errors import TussleError
 from tussle.mission import read_mission, shipped_missions, to_xml
 from tussle.mission.catalogue import KINDS
 from tussle.mission.codecs import written
+from tussle.plugins import stock
 
 xmlschema = pytest.importorskip("xmlschema", reason="needs xmlschema: pip install '.[test]'")
 OF_WORLD = ("entity_interaction", "metrics", "network")

@@ -7,8 +7,9 @@ import os
 import sys
 from pathlib import Path
 
-from tussle import Block, Mission, Simulation, stock
+from tussle import Block, Mission, Simulation
 from tussle.api import Autonomy, Input, MotionModel, Output, Param, State
+from tussle.plugins import stock
 
 N_WARM = 40
 ROOT = str(stock.examples()["JSBSimModel"].with_name("hawk"))

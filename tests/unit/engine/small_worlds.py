@@ -17,7 +17,7 @@ from tussle.api import (
     State,
     Subscribe,
 )
-from tussle.columns import Field, Handle
+from tussle.declare.columns import Field, Handle
 from tussle.stock import SingleIntegrator
 
 VELOCITY = "velocity_x velocity_y velocity_z"

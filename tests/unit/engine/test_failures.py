@@ -538,4 +538,4 @@ def test_names_that_the_api_does_not_have():
     ):
         _ = tussle.stock.Boid
     with pytest.raises(ParameterError, match=r"there is no plugin 'Boid' \(did you mean 'Boids'\?\)"):
-        tussle.stock.load("Boid")
+        tussle.plugins.stock.load("Boid")

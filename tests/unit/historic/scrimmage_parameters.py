@@ -12,10 +12,10 @@ from typing import Any, NamedTuple
 
 import pytest
 
-from tussle import historic, stock
 from tussle.api.plugin import RESERVED, Plugin
 from tussle.errors import TussleError
 from tussle.mission.catalogue import historic as attributes
+from tussle.plugins import historic, stock
 
 FILE = Path(__file__).with_suffix(".csv")
 

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from small_worlds import Drift, block, mission
 
-from tussle import Simulation, historic, stock
+from tussle import Simulation
+from tussle.plugins import historic, stock
 
 STILL = Drift(to=(0.0, 0.0, 0.0))
 

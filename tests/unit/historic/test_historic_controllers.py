@@ -6,9 +6,10 @@ import math
 
 import pytest
 
-from tussle import Block, Mission, Simulation, historic
+from tussle import Block, Mission, Simulation
 from tussle.api import Autonomy, Controller, Input, Output
 from tussle.mission.cadence import TimerCadence
+from tussle.plugins import historic
 from tussle.stock import SingleIntegrator, Still
 
 NEW = (0.0, 0.0, 0.0)

@@ -10,11 +10,12 @@ import pytest
 from scrimmage_parameters import state_of, table
 from small_worlds import block, mission
 
-from tussle import Simulation, historic, stock
+from tussle import Simulation
 from tussle.api import Autonomy, MotionModel
 from tussle.errors import MissionError
-from tussle.historic.angles import angle_2pi, angle_pi
 from tussle.mission import read_mission, to_python, to_xml
+from tussle.plugins import historic, stock
+from tussle.plugins.historic.angles import angle_2pi, angle_pi
 
 TEXT = """<runscript name="a"><run end="1" dt="0.1"/><entity><name>a</name><team_id>1</team_id>
 <autonomy{}>MotorSchemas</autonomy><controller>SimpleCarControllerHeading</controller><motion_model>SimpleCar</motion_model>

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 from small_worlds import Drift, Listener, Talker, block, mission
 
-from tussle import Simulation, historic, stock
+from tussle import Simulation
 from tussle.api import Autonomy, Output, Param, Publish, Sensor, State, Subscribe
 from tussle.messages import WAYPOINT_MODES, WaypointList, WaypointStatus, WorldPointClicked
+from tussle.plugins import historic, stock
 
 
 def moving(name, to=(0, 0, 0), **values):

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 from small_worlds import Drift, Reaper, block, mission
 
-from tussle import Simulation, historic, stock
+from tussle import Simulation
 from tussle.api import Autonomy, Metric, Output, Param, Publish, State
 from tussle.messages import BoundaryShape, CaptureEntity, EntityCaptured, FlagTaken
+from tussle.plugins import historic, stock
 
 
 class Claimer(Autonomy):

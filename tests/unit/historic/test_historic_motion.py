@@ -7,9 +7,10 @@ import math
 import numpy as np
 import pytest
 
-from tussle import Block, Mission, Simulation, historic
+from tussle import Block, Mission, Simulation
 from tussle.api import Autonomy, Output
 from tussle.numeric.quaternion import quat_from_euler, quat_to_yaw
+from tussle.plugins import historic
 
 H = 0.1
 LEVEL = (1.0, 0.0, 0.0, 0.0)

@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tussle import Simulation, historic
+from tussle import Simulation
+from tussle.plugins import historic
 
 BENCHMARKS = Path(__file__).parents[3] / "benchmarks"
 

@@ -9,8 +9,8 @@ import pytest
 
 from tussle import Block, Mission, Scene, Simulation
 from tussle.api import Autonomy, Output
-from tussle.geodesy import Origin
 from tussle.stock import JSBSimControl
+from tussle.world.geodesy import Origin
 
 jsbsim = pytest.importorskip("jsbsim")
 METRE = 3.28084  # [ft]

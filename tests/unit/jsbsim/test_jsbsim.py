@@ -10,11 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tussle import Block, Mission, Simulation, stock
+from tussle import Block, Mission, Simulation
 from tussle.api import Autonomy, Output
 from tussle.errors import ParameterError, PluginError, TussleError
-from tussle.geodesy import Origin
 from tussle.mission import read_mission
+from tussle.plugins import stock
+from tussle.plugins.stock.motion import jsbsim_model
 from tussle.scene import Scene
 from tussle.stock import (
     AircraftPIDController,
@@ -24,7 +25,7 @@ from tussle.stock import (
     JSBSimModelControllerHeadingPID,
     Straight,
 )
-from tussle.stock.motion import jsbsim_model
+from tussle.world.geodesy import Origin
 
 jsbsim = pytest.importorskip("jsbsim")
 SCENE = Scene(origin=Origin.from_degrees(35.7, -120.8, 100.0))

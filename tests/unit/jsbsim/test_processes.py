@@ -10,9 +10,9 @@ import pytest
 from tussle import Block, Mission, Simulation
 from tussle.api import Autonomy, Output
 from tussle.errors import ParameterError, PluginError, SnapshotError
+from tussle.plugins.stock.motion.jsbsim_model.flight import JSBSimFlight
+from tussle.plugins.stock.motion.jsbsim_model.processes import FleetProcess, n_cores
 from tussle.stock import GroundCollision, JSBSimControl
-from tussle.stock.motion.jsbsim_model.flight import JSBSimFlight
-from tussle.stock.motion.jsbsim_model.processes import FleetProcess, n_cores
 
 pytest.importorskip("jsbsim")
 

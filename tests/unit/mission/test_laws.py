@@ -8,11 +8,12 @@ import sys
 import pytest
 
 import tussle.stock as stock
-from tussle import Block, Mission, Simulation, historic
+from tussle import Block, Mission, Simulation
 from tussle.batch import Batch
 from tussle.errors import MissionError
 from tussle.mission import Catalogue, read_mission, to_python, to_xml
 from tussle.mission.effects import exactly
+from tussle.plugins import historic
 
 TEXT = """<runscript name="a"{}>
   <run start="0" end="2" dt="0.1"/>
@@ -61,7 +62,7 @@ def test_the_laws_of_a_mission_stay_with_it(file, tmp_path):
 def test_without_compat_nothing_historic_is_loaded(file):
     script = (
         "import sys; from tussle.mission import read_mission; from tussle import Simulation\n"
-        f"read_mission({str(file)!r}{{}}); print(*(m for m in sys.modules if m.startswith('tussle.historic')))"
+        f"read_mission({str(file)!r}{{}}); print(*(m for m in sys.modules if m.startswith('tussle.plugins.historic.')))"
     )
     printed = [
         subprocess.run(
@@ -70,7 +71,7 @@ def test_without_compat_nothing_historic_is_loaded(file):
         for more in ("", ", compat='scrimmage'")
     ]
     assert printed[0].stdout.split() == []
-    assert "tussle.historic.motion.simple_aircraft" in printed[1].stdout.split()
+    assert "tussle.plugins.historic.motion.simple_aircraft" in printed[1].stdout.split()
 
 
 def test_batches_of_files_and_of_missions_made_in_python(file):

@@ -6,8 +6,8 @@ import math
 
 import pytest
 
-from tussle import texts
 from tussle.api import Param
+from tussle.declare import texts
 from tussle.errors import MissionError, ParameterError, TussleError
 from tussle.mission import codecs
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from tussle import stock
 from tussle.errors import MissionError
 from tussle.mission.catalogue import historic
+from tussle.plugins import stock
 
 
 def test_a_former_name_of_the_same_law_is_read_with_a_note(files):

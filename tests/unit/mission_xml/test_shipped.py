@@ -6,9 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from tussle import Block, Mission, Simulation, stock
+from tussle import Block, Mission, Simulation
 from tussle.errors import MissionError, TussleError
 from tussle.mission import catalogue, read_mission, shipped_missions, tags
+from tussle.plugins import stock
 from tussle.scene import Origin, Scene
 from tussle.stock import Boids, DirectController, Predator, SimpleCapture, SimpleCaptureMetrics, Unicycle
 

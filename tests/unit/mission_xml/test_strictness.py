@@ -6,9 +6,9 @@ import re
 
 import pytest
 
-from tussle import stock
 from tussle.errors import MissionError
 from tussle.mission import read_mission, shipped_missions
+from tussle.plugins import stock
 
 PLUGINS = (
     "<autonomy>Boids</autonomy><controller>DirectController</controller><motion_model>Unicycle</motion_model>"

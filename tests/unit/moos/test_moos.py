@@ -19,9 +19,10 @@ import pytest
 from moos_database import MoosDatabase, message, packet
 from moos_helm import Link, MoosHelm
 
-from tussle import Block, Mission, Simulation, stock
+from tussle import Block, Mission, Simulation
 from tussle.errors import ParameterError, PluginError, SnapshotError
 from tussle.mission import read_mission
+from tussle.plugins import stock
 from tussle.stock import (
     MOOSAutonomy,
     SimpleAircraft,

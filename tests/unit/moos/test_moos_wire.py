@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from moos_database import message, packet, parse
 
-from tussle.stock.autonomy.moos import wire
+from tussle.plugins.stock.autonomy.moos import wire
 
 words = st.text(max_size=20)
 numbers = st.floats(allow_nan=False)

@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from tussle.columns import Numbers
+from tussle.declare.columns import Numbers
 
 
 def bound(plugin, n):

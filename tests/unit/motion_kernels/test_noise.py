@@ -1,8 +1,8 @@
 import numpy as np
 
 from tussle.numeric.quaternion import quat_from_euler, quat_multiply
-from tussle.stock.sensor.noisy_contacts import kernels as contacts
-from tussle.stock.sensor.noisy_state import kernels as state
+from tussle.plugins.stock.sensor.noisy_contacts import kernels as contacts
+from tussle.plugins.stock.sensor.noisy_state import kernels as state
 
 
 def table(n, seed=7):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tussle.numeric.quaternion import quat_from_euler, quat_rotate
-from tussle.stock.motion.simple_aircraft import SimpleAircraft, kernels
+from tussle.plugins.stock.motion.simple_aircraft import SimpleAircraft, kernels
 
 ADVANCE = SimpleAircraft().advance
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from bound_rows import bound, seen
 
-from tussle.stock.controller.simple_aircraft_controller_pid import SimpleAircraftControllerPID
-from tussle.stock.motion.simple_aircraft import SimpleAircraft
-from tussle.stock.motion.simple_aircraft import kernels as aircraft
+from tussle.plugins.stock.controller.simple_aircraft_controller_pid import SimpleAircraftControllerPID
+from tussle.plugins.stock.motion.simple_aircraft import SimpleAircraft
+from tussle.plugins.stock.motion.simple_aircraft import kernels as aircraft
 
 HEADING = (1.0, 0.01, 2.0, math.radians(9.0))
 ALTITUDE = (1.0, 0.0, 0.8, 1.0)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tussle.numeric.quaternion import quat_from_euler, quat_rotate
-from tussle.stock.motion.single_integrator import SingleIntegrator, kernels
+from tussle.plugins.stock.motion.single_integrator import SingleIntegrator, kernels
 
 AS_COMMANDED = -1.0
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from six_degrees import inputs, state
 
-from tussle import stock
 from tussle.errors import ParameterError
 from tussle.numeric.quaternion import quat_rotate
+from tussle.plugins import stock
 from tussle.stock import UUV6DOF, FixedWing6DOF, Multirotor, RigidBody6DOF
 
 WEIGHT = 1.5 * 9.81

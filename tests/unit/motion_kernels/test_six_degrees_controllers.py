@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 from six_degrees import Pilot, flight, seen
 
-from tussle import Block, Mission, Simulation, stock
+from tussle import Block, Mission, Simulation
 from tussle.api import Autonomy, Output
 from tussle.errors import MissionError, PluginError, WiringError
+from tussle.plugins import stock
 from tussle.stock import (
     UUV6DOF,
     AircraftPIDController,

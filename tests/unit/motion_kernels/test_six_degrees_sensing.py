@@ -13,6 +13,7 @@ from six_degrees import Pilot, flight, seen
 from tussle import Block, Mission, Simulation
 from tussle.api import Autonomy, State, Subscribe
 from tussle.errors import ParameterError, PluginError
+from tussle.plugins.stock.autonomy.joystick import JoystickButtons
 from tussle.stock import (
     JoystickAutonomy,
     JoystickController,
@@ -24,7 +25,6 @@ from tussle.stock import (
     Unicycle,
     UnicyclePID,
 )
-from tussle.stock.autonomy.joystick import JoystickButtons
 
 
 def test_rates_and_accelerations_are_those_of_a_circle():

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tussle.numeric.quaternion import quat_from_euler
-from tussle.stock.motion.unicycle import Unicycle, kernels
+from tussle.plugins.stock.motion.unicycle import Unicycle, kernels
 
 PITCHED, LEVEL = Unicycle().advance, Unicycle(use_pitch=False).advance
 

@@ -5,8 +5,8 @@ import pytest
 from bound_rows import bound, seen
 
 from tussle.numeric.pid import pid
-from tussle.stock.controller.unicycle_pid import UnicyclePID
-from tussle.stock.motion.unicycle import Unicycle
+from tussle.plugins.stock.controller.unicycle_pid import UnicyclePID
+from tussle.plugins.stock.motion.unicycle import Unicycle
 
 HEADING, PITCH, ROLL, SPEED = range(4)
 GAINS = np.array(

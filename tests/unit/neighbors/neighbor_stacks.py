@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tussle.neighbors import Index
+from tussle.numeric.neighbors import Index
 
 
 @dataclass

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from neighbor_stacks import stack
 
-from tussle.neighbors.walk import make_walk
+from tussle.numeric.neighbors.walk import make_walk
 from tussle.numeric.quaternion import quat_from_euler
+from tussle.plugins.stock.autonomy.boids import kernels
 from tussle.stock import Boids
-from tussle.stock.autonomy.boids import kernels
 
 REACH, SPHERE, TEAM_RANGE, OTHER_RANGE = 60.0, 30.0, 2.0, 8.0
 

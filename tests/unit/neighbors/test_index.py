@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from neighbor_stacks import block_candidates, stack
 
-from tussle.neighbors import Index, nearest, pairs
+from tussle.numeric.neighbors import Index, nearest, pairs
 
 RNG = np.random.default_rng(3)
 

@@ -6,8 +6,10 @@ import sys
 import numpy as np
 import pytest
 
-from tussle.neighbors import lanes
-from tussle.neighbors.lanes import (
+from tussle.numeric.fingerprint import Fingerprint
+from tussle.numeric.kernel import kernel
+from tussle.numeric.neighbors import lanes
+from tussle.numeric.neighbors.lanes import (
     LANES,
     bits,
     choose,
@@ -18,8 +20,6 @@ from tussle.neighbors.lanes import (
     splat,
     store_some,
 )
-from tussle.numeric.fingerprint import Fingerprint
-from tussle.numeric.kernel import kernel
 
 
 @kernel("F F Fw Iw")
@@ -93,7 +93,7 @@ def test_kernels_are_keyed_by_the_code_generators(monkeypatch):
 
 
 def test_importing_the_package_does_not_import_numba():
-    code = "import sys, tussle.neighbors; sys.exit('numba' in sys.modules)"
+    code = "import sys, tussle.numeric.neighbors; sys.exit('numba' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
@@ -104,7 +104,7 @@ def test_operations_on_lanes_are_found_before_those_on_anything_else(monkeypatch
     from numba.core.types import float64
     from numba.core.typing.templates import _OverloadFunctionTemplate
 
-    from tussle.neighbors.lanes_codegen import LANES_TYPE, MASK_TYPE
+    from tussle.numeric.neighbors.lanes_codegen import LANES_TYPE, MASK_TYPE
 
     def asked(*_):
         raise AssertionError("an overload for other types was asked first")

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from tussle.neighbors.index import Index
-from tussle.neighbors.lane_count import LANES
-from tussle.neighbors.nearest_lanes import NONE, find_nearest
-from tussle.neighbors.search import ANY, DIFFERENT, SAME
 from tussle.numeric.kernel import kernel
+from tussle.numeric.neighbors.index import Index
+from tussle.numeric.neighbors.lane_count import LANES
+from tussle.numeric.neighbors.nearest_lanes import NONE, find_nearest
+from tussle.numeric.neighbors.search import ANY, DIFFERENT, SAME
 
 
 @kernel("(I2 I2 F2) (I I I I F2 F) (i8 f8 i8) i8 F2w I2w")

@@ -5,7 +5,7 @@ import pytest
 from neighbor_stacks import stack
 
 from tussle.numeric.quaternion import quat_from_euler
-from tussle.stock.autonomy.predator import kernels
+from tussle.plugins.stock.autonomy.predator import kernels
 
 N_WORLDS = 3
 

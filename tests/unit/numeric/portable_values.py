@@ -6,8 +6,7 @@ import hashlib
 
 import numpy as np
 
-from tussle import rng
-from tussle.numeric import acos, asin, atan2, cos, exp, log, quaternion, sin, sincos, tan, wrap
+from tussle.numeric import acos, asin, atan2, cos, exp, log, quaternion, rng, sin, sincos, tan, wrap
 from tussle.numeric.arrays import matmul, unit
 from tussle.numeric.rk4 import compile_derivative, rk4
 

@@ -16,9 +16,9 @@ import pytest
 from numpy._core._multiarray_umath import __cpu_dispatch__, __cpu_features__
 
 import tussle
-from tussle.neighbors.walk import make_walk
 from tussle.numeric import store
 from tussle.numeric.kernel import Kernel, kernel
+from tussle.numeric.neighbors.walk import make_walk
 from tussle.numeric.rk4 import driver
 from tussle.stock import Boids
 

@@ -9,8 +9,8 @@ from tussle import Block, Mission, Simulation
 from tussle.api import Autonomy, Output
 from tussle.errors import ParameterError
 from tussle.plan import Problem, solve, solve_with_ompl
-from tussle.plan.sst import Tree, _grow
-from tussle.plan.with_ompl import _Calls
+from tussle.plugins.plan.sst import Tree, _grow
+from tussle.plugins.plan.with_ompl import _Calls
 from tussle.scene import Cuboid, Scene
 from tussle.stock import Multirotor, Unicycle
 

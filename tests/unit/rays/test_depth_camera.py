@@ -11,7 +11,6 @@ from test_radio_network import Radio
 from tussle import Block, Mission, Simulation
 from tussle.api import Autonomy, Input, Output
 from tussle.errors import ParameterError
-from tussle.rays.solids import KINDS
 from tussle.scene import Cuboid, FlatGround, HeightField, Prism, Scene, TriangleMesh
 from tussle.stock import (
     ContactBlobCamera,
@@ -22,6 +21,7 @@ from tussle.stock import (
     SphereNetwork,
     Still,
 )
+from tussle.world.rays.solids import KINDS
 
 WIDTH, HEIGHT = 9, 7
 WALL = Cuboid((10.5, 0, 0), (1, 100, 100))

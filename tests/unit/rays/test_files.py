@@ -15,9 +15,9 @@ from tussle import Simulation
 from tussle.errors import MissingExtraError, MissionError, ParameterError, TussleError
 from tussle.mission import read_mission, to_python, to_xml
 from tussle.mission.terrain_xml import utm
-from tussle.rays.files import read_surface
 from tussle.scene import Cuboid, FlatGround, HeightField, Origin, Prism
 from tussle.view import scenery_of
+from tussle.world.rays.files import read_surface
 
 GRID = """ncols 3
 nrows 2

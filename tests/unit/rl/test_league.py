@@ -13,11 +13,11 @@ from leagues import chase_league, constant
 
 from tussle.batch.executors import InProcess
 from tussle.errors import BatchError, ParameterError
+from tussle.plugins.stock.autonomy.learned.plugin import policy_path
 from tussle.rl import Battle
 from tussle.rl.flight import load_flight
 from tussle.rl.league import League, Pairing, ratings_of
 from tussle.rl.opponents import other_side
-from tussle.stock.autonomy.learned.plugin import policy_path
 
 
 def pairing(a, b, wins, draws, losses):

@@ -15,7 +15,7 @@ import pytest
 
 from tussle import Block, Mission, Simulation
 from tussle.mission import read_mission
-from tussle.ros.node import DEBIAN
+from tussle.plugins.links.ros.node import DEBIAN
 from tussle.stock import RayTrace, ROSAutonomy, ROSClockServer, SimpleCar
 
 # rospy leaves connections to the master to the garbage collector.

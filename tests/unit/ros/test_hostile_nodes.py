@@ -19,8 +19,8 @@ import pytest
 
 from tussle import Block, Mission, Simulation
 from tussle.errors import PluginError
-from tussle.ros.link import RosLink
-from tussle.ros.node import DEBIAN, load_rospy
+from tussle.plugins.links.ros.link import RosLink
+from tussle.plugins.links.ros.node import DEBIAN, load_rospy
 from tussle.stock import ROSAutonomy, SimpleCar
 
 # rospy leaves connections to the master to the garbage collector.

@@ -10,7 +10,7 @@ import pytest
 
 from tussle import Block, Mission, Simulation
 from tussle.api import EasyAutonomy, Output, Param, State
-from tussle.bridges.ros_node import AutonomyHost, set_twist, state_of
+from tussle.cli.bridges.ros_node import AutonomyHost, set_twist, state_of
 from tussle.errors import ParameterError, RosError
 from tussle.stock import Learned, ShapeDraw, Unicycle
 

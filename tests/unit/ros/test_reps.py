@@ -16,7 +16,7 @@ import pytest
 from tussle import Block, Mission, Simulation
 from tussle.api import Output, Sensor
 from tussle.numeric.quaternion import quat_multiply, quat_rotate
-from tussle.ros.node import load_rospy
+from tussle.plugins.links.ros.node import load_rospy
 from tussle.scene import Cuboid, FlatGround, Scene
 from tussle.stock import (
     External,
@@ -93,8 +93,8 @@ class Ros2:
         from cyclonedds.sub import DataReader
         from cyclonedds.topic import Topic
 
-        from tussle.ros.domain import opened_participant
-        from tussle.ros.messages import message_type
+        from tussle.plugins.links.ros.domain import opened_participant
+        from tussle.plugins.links.ros.messages import message_type
 
         typesys = pytest.importorskip("rosbags.typesys")
         self.store = typesys.get_typestore(typesys.Stores.ROS2_JAZZY)
@@ -122,7 +122,7 @@ class Ros2:
         from cyclonedds.topic import Topic
         from cyclonedds.util import duration
 
-        from tussle.ros.messages import message_type
+        from tussle.plugins.links.ros.messages import message_type
 
         reliable = Qos(Policy.Reliability.Reliable(duration(seconds=1)), Policy.History.KeepLast(1))
         type_ = message_type(kind)
@@ -147,7 +147,7 @@ class Ros2:
 def ros_type(kind):
     """A message of ROS 1 by its name."""
     if kind == "mavros_msgs/Altitude":
-        from tussle.ros.altitude import altitude_type
+        from tussle.plugins.links.ros.altitude import altitude_type
 
         return altitude_type()
     return getattr(load_rospy(), kind.partition("/")[2])

@@ -19,14 +19,15 @@ import needs
 import numpy as np
 import pytest
 
-from tussle import Block, Mission, Simulation, stock
+from tussle import Block, Mission, Simulation
 from tussle.errors import MissingExtraError, ParameterError, PluginError, RosError
 from tussle.mission import read_mission
-from tussle.ros import link as ros_link
-from tussle.ros.altitude import altitude_type
-from tussle.ros.link import RosLink
-from tussle.ros.node import load_rospy
-from tussle.ros.steps import StepGate
+from tussle.plugins import stock
+from tussle.plugins.links.ros import link as ros_link
+from tussle.plugins.links.ros.altitude import altitude_type
+from tussle.plugins.links.ros.link import RosLink
+from tussle.plugins.links.ros.node import load_rospy
+from tussle.plugins.links.ros.steps import StepGate
 from tussle.scene import FlatGround, Origin, Scene
 from tussle.stock import (
     External,

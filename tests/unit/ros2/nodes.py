@@ -8,7 +8,7 @@ import time
 from pathlib import Path
 
 from tussle import Block, Mission
-from tussle.ros.dds import Ros2Link
+from tussle.plugins.links.ros.dds import Ros2Link
 from tussle.stock import RayTrace, ROS2Autonomy, ROS2ClockServer, SimpleCar
 
 DT = 0.125

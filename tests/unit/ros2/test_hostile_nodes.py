@@ -16,8 +16,8 @@ from nodes import DT, cars, inbox_of, peer, started, steps_until
 
 from tussle import Simulation
 from tussle.errors import PluginError
-from tussle.ros.dds import Ros2Link
-from tussle.ros.domain import domain_id
+from tussle.plugins.links.ros.dds import Ros2Link
+from tussle.plugins.links.ros.domain import domain_id
 
 N_FLOOD = 20_000
 NOWHERE = "<CycloneDDS><Nonsense/></CycloneDDS>"

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tussle.errors import MissingExtraError
-from tussle.ros.messages import (
+from tussle.plugins.links.ros.messages import (
     DEFINITIONS,
     TYPE_HASHES,
     clock_bytes,
@@ -21,7 +21,7 @@ from tussle.ros.messages import (
     transforms_bytes,
     twist_values,
 )
-from tussle.ros.steps import Transform
+from tussle.plugins.links.ros.steps import Transform
 
 STAMP = 12, 345_678_901
 STATE = [1.0, -2.0, 3.5, 0.5, -0.5, 0.25, 0.75, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0]

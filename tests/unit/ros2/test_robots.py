@@ -15,11 +15,12 @@ from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
 from nodes import DT, cars, inbox_of, link_of, peer, started
 
-from tussle import Block, Mission, Simulation, stock
+from tussle import Block, Mission, Simulation
 from tussle.errors import PluginError
 from tussle.mission import read_mission
-from tussle.ros.domain import opened_participant
-from tussle.ros.messages import message_type
+from tussle.plugins import stock
+from tussle.plugins.links.ros.domain import opened_participant
+from tussle.plugins.links.ros.messages import message_type
 from tussle.stock import (
     RayTrace,
     ROS2Autonomy,

@@ -13,9 +13,9 @@ from tussle.api import Interaction, Metric, State
 from tussle.errors import MissionError, PluginError
 from tussle.messages import EntityCollided, EntityHitGround
 from tussle.mission import read_mission
-from tussle.rays.surfaces import HeightField, TriangleMesh
 from tussle.scene import Cuboid, FlatGround, Plane, Polyhedron, Prism, Scene, Sphere
 from tussle.stock import Ballistic, BulletCollision, FreeBody, RayTrace, SingleIntegrator, Still, examples
+from tussle.world.rays.surfaces import HeightField, TriangleMesh
 
 GRAVITY = 9.81
 FLOOR = Scene(ground=FlatGround(0.0))

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tussle import Block, Mission, Simulation, stock
+from tussle import Block, Mission, Simulation
 from tussle.api import Autonomy, Output, State
+from tussle.plugins import stock
 from tussle.scene import Cuboid, HeightField, Plane, Prism, Scene, Sphere, TriangleMesh
 
 RADIUS = 0.3

@@ -16,9 +16,10 @@ pytest.importorskip("gymnasium", reason="gymnasium is not installed: pip install
 import onnx
 from onnx import TensorProto, helper, numpy_helper
 
-from tussle import Simulation, stock
+from tussle import Simulation
 from tussle.errors import MissingExtraError, ParameterError, PluginError
 from tussle.mission import read_mission
+from tussle.plugins import stock
 from tussle.rl import NearOrigin, PredatorTeam, PreyEscape, make_swarm, write_policy
 from tussle.rl.flight import BATCH, Policy
 from tussle.stock import Learned

@@ -10,8 +10,8 @@ import pytest
 from tussle import Block, Mission, Simulation
 from tussle.errors import MissionError, ParameterError, PluginError
 from tussle.mission import read_mission, to_xml
+from tussle.plugins.stock.autonomy.py_autonomy.bindings import Quaternion, State
 from tussle.stock import PyAutonomy, SimpleAircraft, SimpleAircraftControllerPID, SingleIntegrator
-from tussle.stock.autonomy.py_autonomy.bindings import Quaternion, State
 
 PURSUER = """
 import math
@@ -72,7 +72,7 @@ def test_a_stock_plugin_of_the_same_name_stays_what_it_is(pursuit, tmp_path):
     )
     again = read_mission(tmp_path / "o.xml", plugin_files=[tmp_path / "pursuer.py"]).mission
     assert again.blocks[0].autonomy == mission.blocks[0].autonomy
-    assert type(again.blocks[1].autonomy[0]).__module__ == "tussle.stock.autonomy.straight.plugin"
+    assert type(again.blocks[1].autonomy[0]).__module__ == "tussle.plugins.stock.autonomy.straight.plugin"
 
 
 def test_a_mission_names_no_code(pursuit):
@@ -134,7 +134,7 @@ class Talker:
     ],
 )
 def test_what_is_not_passed_on_is_refused(params, text):
-    from tussle.stock.autonomy.py_autonomy import adapted
+    from tussle.plugins.stock.autonomy.py_autonomy import adapted
 
     block = Block(name="a", autonomy=adapted(Talker)(init_params=params), motion=SingleIntegrator())
     with pytest.raises(PluginError, match=text):

@@ -8,6 +8,7 @@ import pytest
 from tussle import Block, Mission, Simulation
 from tussle.errors import MissionError, ParameterError, PluginError
 from tussle.mission import read_mission, to_xml
+from tussle.plugins.stock.autonomy.rl_simple import adapted
 from tussle.stock import (
     OpenAIRewards,
     RLConsensus,
@@ -16,7 +17,6 @@ from tussle.stock import (
     RLSimpleSensor,
     SingleIntegrator,
 )
-from tussle.stock.autonomy.rl_simple import adapted
 
 ACTORS = """
 class Homing:

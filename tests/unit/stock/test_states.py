@@ -24,6 +24,7 @@ from tussle.api import (
 from tussle.errors import MissionError, ParameterError, PluginError, WiringError
 from tussle.messages import CaptureEntity, TextMessage
 from tussle.mission import read_mission
+from tussle.plugins.stock.autonomy.graphviz_fsm.dot import read_dot
 from tussle.stock import (
     AutonomyExecutor,
     GraphvizFSM,
@@ -34,7 +35,6 @@ from tussle.stock import (
     TopicRelay,
     TrailMS,
 )
-from tussle.stock.autonomy.graphviz_fsm.dot import read_dot
 from tussle.testing import check_plugin
 
 

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 from small_worlds import Drift, block, mission
 
-from tussle import Simulation, stock
+from tussle import Simulation
 from tussle.api import Autonomy, Behavior, Children, Interaction, Output, Param, Publish, State
 from tussle.errors import MissionError
 from tussle.messages import Waypoint
+from tussle.plugins import stock
 from tussle.stock import (
     AvoidEntityMS,
     Boundary,

@@ -7,9 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tussle import Block, Mission, Simulation, historic, stock
+from tussle import Block, Mission, Simulation
 from tussle.api import Autonomy, Metric, Output, State
 from tussle.messages import BoundaryCrossed, FlagCaptured, FlagTaken
+from tussle.plugins import historic, stock
 from tussle.scene import Cuboid, Plane, Polyhedron, Prism, Sphere
 
 FINE = 2001

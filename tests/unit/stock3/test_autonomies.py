@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from small_worlds import Drift, block, mission
 
-from tussle import Scene, Simulation, stock
+from tussle import Scene, Simulation
 from tussle.api import Autonomy, Publish, State, Subscribe
 from tussle.errors import ParameterError, PluginError, UnitError
-from tussle.geodesy import Origin
 from tussle.messages import CustomKeyPress, RemoveEntity, WaypointList, WorldPointClicked
 from tussle.mission import read_mission
+from tussle.plugins import stock
 from tussle.stock import (
     AuctionAssign,
     Boids,
@@ -29,6 +29,7 @@ from tussle.stock import (
     Unicycle,
     UnicyclePID,
 )
+from tussle.world.geodesy import Origin
 
 # -- GoToWaypoint -----------------------------------------------------------------------------------------------------------------
 

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 from small_worlds import Drift, block, mission
 
-from tussle import Simulation, historic, stock
+from tussle import Simulation
 from tussle.api import Autonomy, Output, Publish, RaggedColumn, State, Subscribe
 from tussle.messages import WAYPOINT_MODES, Waypoint, WaypointList, WaypointStatus
+from tussle.plugins import historic, stock
 from tussle.stock import (
     MotorSchemas,
     MoveToGoalMS,

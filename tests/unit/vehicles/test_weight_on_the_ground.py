@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from pages import FENCE, ROOT
 
-from tussle import Block, Mission, Simulation, historic, stock
+from tussle import Block, Mission, Simulation
 from tussle.api import Autonomy, Interaction, MotionModel, Output, Param, State
 from tussle.mission import read_mission
+from tussle.plugins import historic, stock
 from tussle.stock import (
     UUV6DOF,
     Ballistic,

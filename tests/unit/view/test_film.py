@@ -14,7 +14,6 @@ from recorded_games import hunt, record
 
 from tussle import Block, Mission
 from tussle.errors import MissingExtraError, ParameterError, ViewError
-from tussle.geodesy import Origin
 from tussle.scene import Base, Cuboid
 from tussle.stock import Boids, Still, Straight, Unicycle, UnicyclePID
 from tussle.view import Recording
@@ -32,6 +31,7 @@ from tussle.view.frame import Frame
 from tussle.view.scenery import Region, Scenery
 from tussle.view.solids import mesh_of, outline_of
 from tussle.view.terrain import Terrain
+from tussle.world.geodesy import Origin
 
 SMALL = (64, 48)
 BARE = {"size": SMALL, "captions": False, "trails": 0.0}

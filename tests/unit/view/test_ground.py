@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tussle import Simulation, stock
+from tussle import Simulation
 from tussle.mission import Mission, read_mission, shipped_missions
+from tussle.plugins import stock
 from tussle.scene import Scene
-from tussle.shapes import FlatGround
 from tussle.view import scenery_of
+from tussle.world.shapes import FlatGround
 
 SOURCES = {**{name: path for name, (path, _) in shipped_missions().items()}, **stock.examples()}
 SECONDS, MOST = 30.0, 20

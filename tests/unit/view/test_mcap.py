@@ -13,8 +13,7 @@ from recorded_games import hunt, record
 
 from tussle import Block, Mission
 from tussle.errors import MissingExtraError, ParameterError, ViewError
-from tussle.event_texts import event_text
-from tussle.geodesy import Origin
+from tussle.record.event_texts import event_text
 from tussle.scene import Base, Cuboid
 from tussle.stock import Still
 from tussle.view import MODELS, Recording
@@ -22,6 +21,7 @@ from tussle.view.export.mcap_file import default_scale, write_mcap
 from tussle.view.scenery import Region, Scenery
 from tussle.view.solids import mesh_of, outline_of
 from tussle.view.terrain import Terrain
+from tussle.world.geodesy import Origin
 
 SECOND = 1_000_000_000
 

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from tussle import Block, Mission, Scene
-from tussle.geodesy import Origin
 from tussle.mission import read_mission
 from tussle.scene import Base, Cuboid, FlatGround, Plane, Sphere
 from tussle.stock import Boundary, Still
 from tussle.view import scenery_of
+from tussle.world.geodesy import Origin
 
 ROBOT = Block(name="robot", position=(100, 0, 20), motion=Still())
 

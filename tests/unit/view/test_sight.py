@@ -5,8 +5,9 @@ import re
 
 import pytest
 
-from tussle import Block, Mission, Simulation, stock
+from tussle import Block, Mission, Simulation
 from tussle.api import Autonomy, Output, Param
+from tussle.plugins import stock
 from tussle.stock import (
     Boids,
     ContactBlobCamera,

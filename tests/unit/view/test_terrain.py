@@ -5,9 +5,9 @@ import pytest
 
 from tussle import Recorder, Simulation
 from tussle.mission import read_mission
-from tussle.rays.files import read_surface
 from tussle.view import Live, Recording
 from tussle.view.terrain import MOST_DRAWN, Terrain
+from tussle.world.rays.files import read_surface
 
 GRID = """ncols 3
 nrows 2

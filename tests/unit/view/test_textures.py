@@ -19,8 +19,6 @@ from recorded_games import record
 from tussle import Simulation
 from tussle.errors import MissionError, ParameterError
 from tussle.mission import read_mission
-from tussle.rays.files import read_surface
-from tussle.rays.textures import MOST_SIDE, decoded
 from tussle.view import Live, Recording
 from tussle.view.export.film.cameras import View
 from tussle.view.export.film.renderer import Renderer
@@ -29,6 +27,8 @@ from tussle.view.export.html import write_html
 from tussle.view.export.mcap_file import write_mcap
 from tussle.view.frame import empty_frame
 from tussle.view.page.document import scenery_blobs
+from tussle.world.rays.files import read_surface
+from tussle.world.rays.textures import MOST_SIDE, decoded
 
 MISSION = """<runscript name="hilly"><run dt="0.1" end="0.2"/><terrain {}>hills.asc</terrain>
 <entity><team_id>1</team_id><motion_model>Still</motion_model></entity></runscript>

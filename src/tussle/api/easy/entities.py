@@ -18,9 +18,9 @@ from tussle.api.easy.values import (
     with_ids,
     write_number,
 )
-from tussle.columns import Publish
+from tussle.declare.columns import Publish
 from tussle.errors import ParameterError, listed, nearest_name
-from tussle.scene import Scene
+from tussle.world.scene import Scene
 
 ROLES = {
     "autonomy": "an autonomy decides",

@@ -15,7 +15,7 @@ from tussle.api.group import GroupView
 from tussle.api.kinds import Autonomy, Controller, EntityPlugin, Interaction, Metric, Sensor, WorldPlugin
 from tussle.api.plugin import Plugin
 from tussle.api.world import WorldView
-from tussle.columns import Param
+from tussle.declare.columns import Param
 from tussle.errors import ParameterError, listed, nearest_name
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from tussle.api.group import GroupView
 from tussle.errors import ParameterError
-from tussle.neighbors import queries
+from tussle.numeric.neighbors import queries
 
 Found = list[tuple[int, int]]
 """(id, body row) of each entity found."""

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from tussle.api.bodies import read_only
-from tussle.columns import (
+from tussle.declare.columns import (
     Children,
     Column,
     EntityRef,
@@ -20,8 +20,8 @@ from tussle.columns import (
     State,
     Subscribe,
 )
+from tussle.declare.messages import Messages
 from tussle.errors import DeclarationError, ParameterError
-from tussle.messages import Messages
 
 VECTORS = {
     "pos": "Position [m], (3,), world frame.",

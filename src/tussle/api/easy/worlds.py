@@ -21,10 +21,10 @@ from tussle.api.easy.search import Search
 from tussle.api.easy.shared import RandomNumbers, WorldDraw
 from tussle.api.easy.values import BODY, Cells, Columns, ReceivedMessage, Write, make_type, with_ids
 from tussle.api.world import WorldView
-from tussle.columns import Column, State
+from tussle.declare.columns import Column, State
+from tussle.declare.messages import Message
 from tussle.errors import ParameterError, listed, nearest_name
-from tussle.messages import Message
-from tussle.scene import Scene
+from tussle.world.scene import Scene
 
 
 class WorldShared:

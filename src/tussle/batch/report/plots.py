@@ -11,8 +11,8 @@ import numpy as np
 
 from tussle.batch.report.drawing import blank, legend_above, rule_x, rule_y, shortened
 from tussle.batch.report.formatting import estimate, percent
-from tussle.event_texts import end_text
 from tussle.palette import INK, MUTED, NEUTRAL, PAPER, SEQUENTIAL, mixed
+from tussle.record.event_texts import end_text
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

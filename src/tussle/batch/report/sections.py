@@ -28,8 +28,8 @@ from tussle.batch.report.formatting import (
 from tussle.batch.report.report_data import Measure, ReportData
 from tussle.batch.selection import written
 from tussle.batch.variables import Range
-from tussle.event_texts import END_TEXTS, end_text
 from tussle.palette import PAPER, mixed
+from tussle.record.event_texts import END_TEXTS, end_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

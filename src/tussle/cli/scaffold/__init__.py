@@ -10,7 +10,6 @@ from typing import Any
 
 from rich.text import Text
 
-from tussle import stock
 from tussle.cli.play_options import NewOptions
 from tussle.cli.progress import compiling
 from tussle.cli.scaffold.copied import class_renamed, merged
@@ -18,6 +17,7 @@ from tussle.cli.scaffold.played import example_text, mission_text
 from tussle.cli.tables import fact_list, indented
 from tussle.cli.terminal import put
 from tussle.errors import MissionError, ParameterError, listed, nearest_name
+from tussle.plugins import stock
 
 TEMPLATES = Path(__file__).parent / "templates"
 KINDS = ("autonomy", "motion", "controller", "sensor", "interaction", "metric", "network")

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from tussle import stock
 from tussle.cli.scaffold.copied import class_renamed
+from tussle.plugins import stock
 
 LINEUPS = {
     "autonomy": ("{name}", "DirectController", "Unicycle"),

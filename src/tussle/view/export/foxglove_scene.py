@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tussle.event_texts import event_text
-from tussle.rays.surfaces import MeshPart
+from tussle.record.event_texts import event_text
 from tussle.view.frame import Event, Frame
 from tussle.view.recording import Recording
 from tussle.view.shapes import MODELS, Mesh
 from tussle.view.style import Colour
+from tussle.world.rays.surfaces import MeshPart
 
 if TYPE_CHECKING:
     from foxglove import messages as fg

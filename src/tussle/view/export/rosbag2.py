@@ -13,14 +13,14 @@ import numpy as np
 
 from tussle.errors import MissingExtraError, ParameterError, ViewError
 from tussle.numeric.quaternion import quat_rotate_inverse
-from tussle.ros.messages import clock_bytes, odometry_bytes, transforms_bytes
-from tussle.ros.robot import AT_ORIGIN, FRAMES, ROOT, height_above_floor, on_floor
-from tussle.ros.steps import NANO, Transform
-from tussle.scene import Scene
+from tussle.plugins.links.ros.messages import clock_bytes, odometry_bytes, transforms_bytes
+from tussle.plugins.links.ros.robot import AT_ORIGIN, FRAMES, ROOT, height_above_floor, on_floor
+from tussle.plugins.links.ros.steps import NANO, Transform
 from tussle.view.export.whole_file import unwritable
 from tussle.view.frame import Frame
 from tussle.view.page.recorded import kept_frames
 from tussle.view.recording import Recording
+from tussle.world.scene import Scene
 
 VERSION: Literal[8] = 8
 """Of the format: the oldest that rosbags writes."""

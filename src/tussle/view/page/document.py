@@ -10,8 +10,6 @@ import numpy as np
 
 import tussle
 from tussle.mission import Mission
-from tussle.rays.surfaces import MeshPart
-from tussle.rays.textures import jpeg
 from tussle.view.frame import Event
 from tussle.view.page.packing import ints
 from tussle.view.scenery import Scenery
@@ -20,6 +18,8 @@ from tussle.view.sight import Sight, range_of
 from tussle.view.solids import MOST_FACES
 from tussle.view.style import Style
 from tussle.view.terrain import Terrain
+from tussle.world.rays.surfaces import MeshPart
+from tussle.world.rays.textures import jpeg
 
 FORMAT = 2
 """Version of the document and of the chunks, for programs that read them from a file."""

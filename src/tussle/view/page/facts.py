@@ -6,8 +6,8 @@ import math
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from tussle.displays import counted, shortened
-from tussle.event_texts import end_text
+from tussle.declare.displays import counted, shortened
+from tussle.record.event_texts import end_text
 
 MOST_BLOCKS = 20
 """Blocks that are listed."""

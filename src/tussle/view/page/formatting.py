@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from tussle import displays
+from tussle.declare import displays
+from tussle.declare.units import split_units, unit_of
 from tussle.engine.result import WorldResult
-from tussle.units import split_units, unit_of
 from tussle.view.entity import EntityState, Reading, ShownMessage
 
 MOST_ITEMS = 6

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from tussle import displays
+from tussle.declare import displays
 from tussle.errors import ParameterError, ViewError
 from tussle.mission import Mission
 from tussle.view.page.chunks import ANGLE_ERROR, FULL_HEALTH, UNIT, pack, position_error, step_of

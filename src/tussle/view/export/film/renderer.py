@@ -15,7 +15,6 @@ from typing import Any, Self
 import numpy as np
 
 from tussle.errors import MissingExtraError, ViewError
-from tussle.rays.surfaces import MeshPart
 from tussle.view.export.film.cameras import VIEW_ANGLE, View
 from tussle.view.export.film.ground import Tints, grid_lines, ground_width
 from tussle.view.frame import Frame
@@ -23,6 +22,7 @@ from tussle.view.scenery import Scenery
 from tussle.view.shapes import MODELS, Mesh, ball
 from tussle.view.style import Style
 from tussle.view.terrain import Terrain
+from tussle.world.rays.surfaces import MeshPart
 
 WINDOW_VARIABLE = "VTK_DEFAULT_OPENGL_WINDOW"
 """Environment variable by which VTK chooses its window; the user's own value is kept."""

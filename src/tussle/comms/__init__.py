@@ -1,5 +1,0 @@
-"""Message delivery: outboxes, queues and inboxes."""
-
-from tussle.comms.topic import EVERYONE, SAME_ENTITY, Inbox, Publisher, TopicBuffer
-
-__all__ = ["EVERYONE", "SAME_ENTITY", "Inbox", "Publisher", "TopicBuffer"]

@@ -1,0 +1,1 @@
+"""What plugins declare: columns, messages and their topics, with units and texts."""

@@ -1,7 +1,0 @@
-"""Range and nearest-neighbour queries over all worlds of a stack, and blocks of queries for kernels."""
-
-from tussle.neighbors.index import Blocks, Index
-from tussle.neighbors.lane_count import LANES
-from tussle.neighbors.queries import PairArrays, nearest, pairs
-
-__all__ = ["LANES", "Blocks", "Index", "PairArrays", "nearest", "pairs"]

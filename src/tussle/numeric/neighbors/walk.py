@@ -1,0 +1,189 @@
+"""The pair loop of neighbour laws: each block of eight agents loops over its candidates, one agent per lane.
+
+The loop is generated as source text for its laws: their columns become arguments, their contributions accumulators in
+registers. Several laws share one walk: the candidates near a block are found once, and the first loop over them marks those
+in range of laws with a smaller radius.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from tussle.errors import DeclarationError
+from tussle.numeric.kernel import Kernel, device, is_interpreted, kernel
+from tussle.numeric.neighbors import lanes
+from tussle.numeric.neighbors.lane_code import lane_code
+from tussle.numeric.neighbors.lane_count import LANES
+from tussle.numeric.neighbors.lanes import bits, choose, load
+from tussle.numeric.neighbors.law import Law
+from tussle.numeric.neighbors.walk_python import walk_in_python
+from tussle.numeric.neighbors.walk_text import Part, WalkText
+from tussle.numeric.rk4 import label
+
+
+@dataclass(frozen=True)
+class Walk:
+    """A compiled walk over the neighbours for several laws.
+
+    Attributes:
+        own: Columns by row that the kernel takes, in order; includes "team" if a law filters by team.
+        other: Columns by place that the kernel takes, in order.
+        run: The kernel; its lanes are eight agents.
+        run_single: The kernel for agents that are each in a different world; its lanes are eight neighbours of one agent. It also
+            takes the positions that decide who is in range.
+        n_out: Total number of contributions.
+    """
+
+    own: tuple[str, ...]
+    other: tuple[str, ...]
+    run: Callable[..., Any]
+    run_single: Callable[..., Any]
+    n_out: int
+
+
+@device
+def squared_gap(x, y, z, box):  # type: ignore[no-untyped-def]
+    """Squared distance of eight points from a box (west, east, south, north, low, high), 0 inside."""
+    west, east, south, north, low, high = box
+    dx = choose(x < west, west - x, choose(x > east, x - east, 0.0))
+    dy = choose(y < south, south - y, choose(y > north, y - north, 0.0))
+    dz = choose(z < low, low - z, choose(z > high, z - high, 0.0))
+    return dx * dx + dy * dy + dz * dz
+
+
+@device
+def find_near(begin, end, span_start, span_end, places, box, reach2, found):  # type: ignore[no-untyped-def]
+    """Write the places of the spans [begin, end) within reach of the box to `found`, without a branch per place. Returns their number."""
+    sx, sy, sz = places
+    n = 0
+    for s in range(begin, end):
+        for p in range(span_start[s], span_end[s], LANES):
+            hit = bits(squared_gap(load(sx, p), load(sy, p), load(sz, p), box) < reach2)
+            hit &= (1 << min(LANES, span_end[s] - p)) - 1
+            for k in range(LANES):
+                found[n] = p + k
+                n += (hit >> k) & 1
+    return n
+
+
+@device
+def find_teams(begin, end, span_start, span_end, places, team, wanted, box, reach2, mates, others):  # type: ignore[no-untyped-def]
+    """Like `find_near`: places of team `wanted` go to `mates`, the others to `others`. Returns both numbers."""
+    sx, sy, sz = places
+    n_mates, n_others = 0, 0
+    for s in range(begin, end):
+        for p in range(span_start[s], span_end[s], LANES):
+            hit = bits(squared_gap(load(sx, p), load(sy, p), load(sz, p), box) < reach2)
+            hit &= (1 << min(LANES, span_end[s] - p)) - 1
+            if hit == 0:
+                continue
+            mine = hit & bits(load(team, p) == wanted)
+            for k in range(LANES):
+                mates[n_mates] = p + k
+                n_mates += (mine >> k) & 1
+            hit ^= mine
+            if hit != 0:
+                for k in range(LANES):
+                    others[n_others] = p + k
+                    n_others += (hit >> k) & 1
+    return n_mates, n_others
+
+
+@device
+def square_of(radius):  # type: ignore[no-untyped-def]
+    """Squared radius; -1 for a radius that is not positive, so that nothing is in range."""
+    return radius * radius if radius > 0.0 else -1.0
+
+
+@device
+def sum_of(lane):  # type: ignore[no-untyped-def]
+    """Sum of eight numbers, in pairs."""
+    return ((lane[0] + lane[1]) + (lane[2] + lane[3])) + ((lane[4] + lane[5]) + (lane[6] + lane[7]))
+
+
+@device
+def first_of(lane):  # type: ignore[no-untyped-def]
+    """Lane with the smallest of eight numbers, among equal ones that with the smallest of the next eight."""
+    best = 0
+    for k in range(1, LANES):
+        if lane[k] < lane[best] or (lane[k] == lane[best] and lane[LANES + k] < lane[LANES + best]):
+            best = k
+    return best
+
+
+FROM_LANES = [
+    "below",
+    "bits",
+    "choose",
+    "inverse_sqrt",
+    "lanes_sqrt",
+    "load",
+    "lowest",
+    "number",
+    "splat",
+    "store",
+    "truth",
+]
+
+
+def make_walk(laws: Sequence[Law], where: Law | None, code_of: Callable[[str], str]) -> Walk:
+    """Generate the walk of some laws.
+
+    Args:
+        laws: In the order of the results.
+        where: A law with one contribution: True if the pair counts for the laws.
+        code_of: Returns the signature code (F, I, B) of an own column.
+
+    Raises:
+        DeclarationError: A law cannot be translated to lanes, or returns a different number of contributions than declared.
+    """
+    scope: dict[str, Any] = {name: getattr(lanes, name) for name in FROM_LANES}
+    scope |= {
+        "np": np,
+        "inf": np.inf,
+        "nan": np.nan,
+        "LANES": LANES,
+        "square_of": square_of,
+        "find_near": find_near,
+        "find_teams": find_teams,
+        "sum_of": sum_of,
+        "first_of": first_of,
+    }
+    parts, at = [], 0
+    for law in laws:
+        parts.append(part_of(law, at, scope))
+        at += len(law.reductions)
+    text = WalkText(parts, part_of(where, at, scope) if where else None, at)
+    if any(is_interpreted(law.function) for law in laws):
+        run, single = (walk_in_python(laws, where, text.own, text.other, n) for n in (1, LANES))
+        return Walk(text.own, text.other, run, single, at)
+    other, own = " ".join("F" * len(text.other)), " ".join(code_of(name) for name in text.own)
+    out = "(I2w F2w) i8 (i8 i8) i8 -> i8" if text.lists_pairs else "F2w i8 (i8 i8) i8"
+
+    def written(lines: Iterable[str], points: str, suffix: str) -> Kernel:
+        exec("\n".join(lines) + "\n", scope)  # noqa: S102 - generated here; authors' code is in separate functions
+        made = scope["walk"]
+        made.__module__ = laws[0].function.__module__
+        names = (law.function.__qualname__ for law in (*laws, *([where] if where else [])))
+        made.__qualname__ = "+".join(names) + suffix
+        return kernel(f"(I2 I2 I) ({points}) ({other}) ({own}) {out}")(made)
+
+    kernel_of_blocks = written(text.lines(), "F2 F2", "")
+    single = written(text.single_lines(), "F2 F2 F2", " single")
+    return Walk(text.own, text.other, kernel_of_blocks, single, at)
+
+
+def part_of(law: Law, at: int, scope: dict[str, Any]) -> Part:
+    """Translate a law to lanes and add it to the scope of the walk."""
+    code = lane_code(law.function)
+    if len(code.masks) != len(law.reductions):
+        raise DeclarationError(
+            f"{label(law.function)}: it returns {len(code.masks)} contributions, but {len(law.reductions)} are declared: "
+            f"{', '.join(law.reductions)}"
+        )
+    scope[f"law_{at}"] = code.function
+    return Part(law, at, code.masks, code.can_skip)

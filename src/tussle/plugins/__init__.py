@@ -1,0 +1,1 @@
+"""Plugins that ship, planners, and links to other systems."""

@@ -1,0 +1,64 @@
+"""Pursuit and capture of prey."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tussle.api import Autonomy, EntityRef, GroupView, Output, Param, Publish
+from tussle.declare.messages import CaptureEntity
+from tussle.plugins.stock.autonomy.predator import kernels
+
+
+class Predator(Autonomy):
+    """Pursues the nearest prey (pure pursuit) and claims every entity of another team within `capture_range`.
+
+    Without `allow_prey_switching` a target is kept until it is removed. Claims include rival predators, as in the paper's code.
+    When no prey is left, the last commands persist. Without `pursue` it only claims, and another autonomy of the entity flies.
+    """
+
+    grade = "portable"
+
+    max_speed = Param(30.0, unit="m/s", ge=0.0, doc="Desired speed.")
+    capture_range = Param(
+        5.0, unit="m", ge=0.0, doc="Distance below which entities of other teams are claimed."
+    )
+    allow_prey_switching = Param(True, doc="Choose the nearest prey in every step.")
+    prey_team_id = Param(1, doc="Team that is hunted.")
+    pursue = Param(True, structural=True, doc="Write commands; otherwise only claim.")
+    target = EntityRef(doc="Prey being hunted.")
+    speed = Output(unit="m/s")
+    turn_rate = Output(unit="rad/s")
+    pitch_rate = Output(unit="rad/s")
+    desired_heading = Output(unit="rad")
+    desired_speed = Output(unit="m/s")
+    capture = Publish(CaptureEntity)
+
+    def offered_outputs(self) -> list[str]:
+        """Return the commands, if it pursues."""
+        return list(self.outputs()) if self.pursue else []
+
+    def step(self, g: GroupView) -> None:
+        index = g.any_index()
+        bodies = g.bodies
+        pos = x, y, z = g.components("pos")
+        rows = bodies.id, index.row_world, index.place, index.order
+        table = (*index.table, g.by_place(index, "team")[0])
+        target_row = g.rows_of(self.target)
+        room, n_claims = 0, 16 * g.n + 64
+        while n_claims > room:  # repeat with more room if the claims did not fit; the targets do not change
+            room = n_claims
+            claim_row, claimed = np.empty(room, np.int64), np.empty(room, np.int64)
+            n_claims = kernels.hunt(
+                (x, y, z, self.capture_range), (g.team, self.prey_team_id), self.allow_prey_switching,
+                (self.target, target_row, claim_row, claimed), rows, g.first, table,
+            )  # fmt: skip
+        wired = self.wired
+        if "speed" in wired or "turn_rate" in wired or "pitch_rate" in wired:
+            commands = self.speed, self.turn_rate, self.pitch_rate
+            kernels.pursue(pos, g.components("quat"), self.max_speed, target_row, bodies.pos, commands)
+        if "desired_heading" in wired or "desired_speed" in wired:
+            kernels.point(
+                x, y, self.max_speed, target_row, bodies.pos, self.desired_heading, self.desired_speed
+            )
+        if n_claims:
+            self.capture.publish(claim_row[:n_claims], target=bodies.id[claimed[:n_claims]])

@@ -1,0 +1,5 @@
+"""GlobalNetwork: messages to all entities."""
+
+from tussle.plugins.stock.network.global_network.plugin import GlobalNetwork
+
+__all__ = ["GlobalNetwork"]

@@ -1,6 +1,0 @@
-"""A simulation as a server for programs in any language: see docs/serve.md."""
-
-from tussle.serve.server import Server
-from tussle.serve.session import Session
-
-__all__ = ["Server", "Session"]

@@ -1,5 +1,0 @@
-"""ArduPilot: a vehicle is flown by ArduPilot's simulated flight controller."""
-
-from tussle.stock.autonomy.ardupilot.plugin import ArduPilot
-
-__all__ = ["ArduPilot"]

@@ -1,5 +1,0 @@
-"""AuctionAssign: auctions a task."""
-
-from tussle.stock.autonomy.auction_assign.plugin import AuctionAssign, BidAuction, ResultAuction, StartAuction
-
-__all__ = ["AuctionAssign", "BidAuction", "ResultAuction", "StartAuction"]

@@ -1,5 +1,0 @@
-"""GoToByLidar: flies to a goal between obstacles that a lidar sees."""
-
-from tussle.stock.autonomy.go_to_by_lidar.plugin import GoToByLidar
-
-__all__ = ["GoToByLidar"]

@@ -1,5 +1,0 @@
-"""GraphvizFSM: a finite state machine given as a graph."""
-
-from tussle.stock.autonomy.graphviz_fsm.plugin import GraphvizFSM
-
-__all__ = ["GraphvizFSM"]

@@ -1,5 +1,0 @@
-"""JoystickAutonomy and JoystickController: manual commands."""
-
-from tussle.stock.autonomy.joystick.plugin import JoystickAutonomy, JoystickButtons, JoystickController
-
-__all__ = ["JoystickAutonomy", "JoystickButtons", "JoystickController"]

@@ -1,5 +1,0 @@
-"""Learned: a policy from an ONNX file flies."""
-
-from tussle.stock.autonomy.learned.plugin import Learned
-
-__all__ = ["Learned"]

@@ -1,5 +1,0 @@
-"""MOOSAutonomy: a helm of MOOS-IvP steers a vehicle."""
-
-from tussle.stock.autonomy.moos.plugin import MOOSAutonomy
-
-__all__ = ["MOOSAutonomy"]

@@ -1,5 +1,0 @@
-"""RLSimple and RLConsensus: robots earn rewards near the origin or near each other, with actions of an actor."""
-
-from tussle.stock.autonomy.rl_simple.plugin import RLConsensus, RLSimple, adapted
-
-__all__ = ["RLConsensus", "RLSimple", "adapted"]

@@ -1,5 +1,0 @@
-"""ROSAutonomy and ROSControl: robots that are driven by nodes of ROS 1."""
-
-from tussle.stock.autonomy.ros_autonomy.plugin import ROSAutonomy, ROSControl
-
-__all__ = ["ROSAutonomy", "ROSControl"]

@@ -1,5 +1,0 @@
-"""TrajectoryRecordPlayback: flies a recorded trajectory."""
-
-from tussle.stock.autonomy.trajectory_record_playback.plugin import TrajectoryRecordPlayback
-
-__all__ = ["TrajectoryRecordPlayback"]

@@ -1,5 +1,0 @@
-"""MultirotorControllerPID: controls velocity and heading of a Multirotor."""
-
-from tussle.stock.controller.multirotor_controller_pid.plugin import MultirotorControllerPID
-
-__all__ = ["MultirotorControllerPID"]

@@ -1,5 +1,0 @@
-"""CaptureInBoundaryInteraction: defenders capture intruders in a region."""
-
-from tussle.stock.interaction.capture_in_boundary_interaction.plugin import CaptureInBoundaryInteraction
-
-__all__ = ["CaptureInBoundaryInteraction"]

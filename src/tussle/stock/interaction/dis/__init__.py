@@ -1,5 +1,0 @@
-"""DIS: entities are shared with other simulators by IEEE 1278.1."""
-
-from tussle.stock.interaction.dis.plugin import DIS
-
-__all__ = ["DIS"]

@@ -1,5 +1,0 @@
-"""GraphInteraction: publishes a road graph."""
-
-from tussle.stock.interaction.graph_interaction.plugin import GraphInteraction
-
-__all__ = ["GraphInteraction"]

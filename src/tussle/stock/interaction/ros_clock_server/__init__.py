@@ -1,5 +1,0 @@
-"""ROSClockServer: simulated time for nodes of ROS 1."""
-
-from tussle.stock.interaction.ros_clock_server.plugin import ROSClockServer
-
-__all__ = ["ROSClockServer"]

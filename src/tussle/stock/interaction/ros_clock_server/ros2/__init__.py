@@ -1,5 +1,0 @@
-"""ROS2ClockServer: simulated time for nodes of ROS 2."""
-
-from tussle.stock.interaction.ros_clock_server.ros2.plugin import ROS2ClockServer
-
-__all__ = ["ROS2ClockServer"]

@@ -1,5 +1,0 @@
-"""SimpleCollision: removes entities that collide."""
-
-from tussle.stock.interaction.simple_collision.plugin import SimpleCollision
-
-__all__ = ["SimpleCollision"]

@@ -1,5 +1,0 @@
-"""DoubleIntegrator: a point mass that follows an acceleration command."""
-
-from tussle.stock.motion.double_integrator.plugin import DoubleIntegrator
-
-__all__ = ["DoubleIntegrator"]

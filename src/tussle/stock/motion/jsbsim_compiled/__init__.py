@@ -1,5 +1,0 @@
-"""Aircraft of JSBSim's format, compiled to kernels."""
-
-from tussle.stock.motion.jsbsim_compiled.plugin import JSBSimCompiled
-
-__all__ = ["JSBSimCompiled"]

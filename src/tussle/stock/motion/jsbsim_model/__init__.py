@@ -1,5 +1,0 @@
-"""JSBSimModel and JSBSimControl: aircraft flown by JSBSim."""
-
-from tussle.stock.motion.jsbsim_model.plugin import JSBSimControl, JSBSimModel
-
-__all__ = ["JSBSimControl", "JSBSimModel"]

@@ -1,5 +1,0 @@
-"""SimpleAircraft: a banking aircraft commanded by throttle, roll rate and pitch rate."""
-
-from tussle.stock.motion.simple_aircraft.plugin import SimpleAircraft
-
-__all__ = ["SimpleAircraft"]

@@ -1,5 +1,0 @@
-"""SimpleCar: a car that follows a speed and a steering angle."""
-
-from tussle.stock.motion.simple_car.plugin import SimpleCar
-
-__all__ = ["SimpleCar"]

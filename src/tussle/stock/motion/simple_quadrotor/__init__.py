@@ -1,5 +1,0 @@
-"""SimpleQuadrotor: a quadrotor reduced to accelerations along its own axes and a turn."""
-
-from tussle.stock.motion.simple_quadrotor.plugin import SimpleQuadrotor
-
-__all__ = ["SimpleQuadrotor"]

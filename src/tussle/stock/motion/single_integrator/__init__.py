@@ -1,5 +1,0 @@
-"""SingleIntegrator: a point that moves with the commanded velocity."""
-
-from tussle.stock.motion.single_integrator.plugin import SingleIntegrator
-
-__all__ = ["SingleIntegrator"]

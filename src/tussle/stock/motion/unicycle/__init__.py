@@ -1,5 +1,0 @@
-"""Unicycle: a vehicle that flies where its nose points, with commanded speed, turn rate and pitch rate."""
-
-from tussle.stock.motion.unicycle.plugin import Unicycle
-
-__all__ = ["Unicycle"]

@@ -1,5 +1,0 @@
-"""RadioNetwork: radio with fading, bandwidth, queues and jammers."""
-
-from tussle.stock.network.radio_network.plugin import RadioNetwork
-
-__all__ = ["RadioNetwork"]

@@ -1,5 +1,0 @@
-"""NoisyState: noisy measurements of an entity's own state."""
-
-from tussle.stock.sensor.noisy_state.plugin import NoisyState
-
-__all__ = ["NoisyState"]

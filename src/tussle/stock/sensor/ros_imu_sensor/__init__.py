@@ -1,5 +1,0 @@
-"""ROSIMUSensor: specific force and rotation for nodes of ROS 1."""
-
-from tussle.stock.sensor.ros_imu_sensor.plugin import ROSIMUSensor
-
-__all__ = ["ROSIMUSensor"]

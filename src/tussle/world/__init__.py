@@ -1,0 +1,1 @@
+"""The world around the entities: scene, shapes, rays and contacts."""

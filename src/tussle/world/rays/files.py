@@ -1,0 +1,151 @@
+"""Surfaces from files, which are untrusted: sizes in a file's header are checked before memory is allocated."""
+
+from __future__ import annotations
+
+import io
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tussle.documents import read_bytes
+from tussle.errors import MissingExtraError, ParameterError, listed, nearest_name
+from tussle.world.rays.grids import read_ascii_grid, read_image
+from tussle.world.rays.surfaces import MOST_FACES, HeightField, TriangleMesh
+from tussle.world.rays.textures import decoded
+from tussle.world.rays.vtk import read_vtk
+
+MOST_BYTES = 64_000_000
+IMAGES = (".png", ".tif", ".tiff")
+BY_TRIMESH = (".obj", ".ply", ".stl", ".glb", ".gltf", ".off")
+MESHES = (".vtk", *BY_TRIMESH)
+SUFFIXES = (".asc", *IMAGES, *MESHES)
+ELEMENT = re.compile(rb"^element\s+\w+\s+(\d+)", re.MULTILINE)
+
+
+def read_surface(
+    path: Path | str, *, cell: float | None = None, height: float | None = None, scale: float = 1.0,
+    position: tuple[float, float, float] = (0.0, 0.0, 0.0),
+) -> HeightField | TriangleMesh:  # fmt: skip
+    """Read a height field or a mesh from a file.
+
+    Args:
+        path: An ASCII grid (.asc), an image (.png, .tif; needs Pillow), legacy VTK poly data (.vtk), or a mesh that trimesh reads (.obj,
+            .ply, .stl, .glb, .gltf, .off).
+        cell: Of an image: width of a pixel [m]; a GeoTIFF in metres has its own.
+        height: Of an image: height of white above black [m]; not needed for a TIFF of heights.
+        scale: Of a mesh: length of its unit [m].
+        position: Where the file's origin is in the world [m]; of an image, its south-western pixel.
+
+    Raises:
+        MissingExtraError: The package that reads the format is not installed.
+        ParameterError: The file cannot be read, is too large, or holds something else.
+    """
+    path = Path(path)
+    suffix = path.suffix.lower()
+    if suffix not in SUFFIXES:
+        raise ParameterError(
+            f"{path}: {suffix!r} is no format of surfaces{nearest_name(suffix, SUFFIXES)}; {listed(SUFFIXES)}"
+        )
+    if not (0.0 < scale < np.inf and np.isfinite(position).all()):
+        raise ParameterError(
+            f"{path}: scale = {scale!r} at {position!r} is not allowed; it takes a scale > 0 and finite numbers"
+        )
+    data = bytes_of(path)
+    try:
+        if suffix == ".asc":
+            found: HeightField | TriangleMesh = read_ascii_grid(path, data)
+        elif suffix in IMAGES:
+            found = read_image(path, data, cell, height)
+        else:
+            vertices, faces = read_vtk(data) if suffix == ".vtk" else _by_trimesh(path, data)
+            found = TriangleMesh(vertices * scale + np.array(position), faces)
+    except ParameterError as error:
+        raise ParameterError(str(error) if str(error).startswith(str(path)) else f"{path}: {error}") from None
+    if isinstance(found, HeightField):
+        x, y, z = position
+        return HeightField(found.height + z, found.west + x, found.south + y, found.cell)
+    return found
+
+
+def read_texture(path: Path | str) -> np.ndarray:
+    """Read an image (.png, .jpg, .tif) that is draped over a surface: red, green, blue, (height, width, 3), uint8.
+
+    Raises:
+        MissingExtraError: Pillow is not installed.
+        ParameterError: The file cannot be read, is too large, or is no image.
+    """
+    return decoded(str(path), bytes_of(Path(path)))
+
+
+def bytes_of(path: Path) -> bytes:
+    """Content of a regular file of at most `MOST_BYTES`.
+
+    Raises:
+        ParameterError: It is no such file.
+    """
+    return read_bytes(path, ParameterError, MOST_BYTES)
+
+
+def corners(vertices: Any) -> np.ndarray:
+    """Vertices of a mesh as they come from the reader of another package, (n, 3).
+
+    Raises:
+        ParameterError: They are something else.
+    """
+    found = np.asarray(vertices, float)
+    if found.ndim != 2 or found.shape[1] != 3:
+        raise ParameterError(
+            f"its vertices have shape {found.shape}; a mesh takes (n, 3), which is x, y and z of each"
+        )
+    return found
+
+
+def _announced(suffix: str, data: bytes) -> int:
+    """The largest number of elements that a file announces, for which a reader may take memory at once."""
+    if suffix == ".ply":
+        return max((int(n) for n in ELEMENT.findall(data[: data.find(b"end_header")])), default=0)
+    if suffix in (".glb", ".gltf"):
+        text = data
+        if data[:4] == b"glTF":
+            text = data[20 : 20 + int.from_bytes(data[12:16], "little")]
+        content = json.loads(text)
+        counts = [each.get("count", 0) for each in content.get("accessors", ())]
+        # Instances of one mesh count each time.
+        return int(
+            max(
+                [
+                    *counts,
+                    sum(counts)
+                    * max(1, len(content.get("nodes", ())) // max(1, len(content.get("meshes", (0,))))),
+                ]
+            )
+        )
+    if suffix == ".stl" and data[:5] != b"solid":
+        return int.from_bytes(data[80:84], "little")
+    return 0
+
+
+def _by_trimesh(path: Path, data: bytes) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices (n, 3) and faces (m, 3)."""
+    try:
+        import trimesh
+    except ImportError:
+        raise MissingExtraError(f"{path}: meshes need trimesh: pip install 'tussle[scene]'") from None
+    suffix = path.suffix.lower()
+    try:
+        if _announced(suffix, data) > 3 * MOST_FACES:
+            raise ParameterError(f"{path}: the mesh announces more than {MOST_FACES:,} triangles")
+        # Without a path and a resolver, the file cannot make trimesh read other files.
+        made: Any = trimesh.load(
+            io.BytesIO(data), file_type=suffix[1:], force="mesh", process=False, skip_materials=True
+        )
+        return corners(made.vertices), np.asarray(made.faces)
+    except ParameterError:
+        raise
+    except Exception as error:
+        raise ParameterError(
+            f"{path}: it cannot be read as {suffix}: {type(error).__name__}: {str(error)[:200]}"
+        ) from error
