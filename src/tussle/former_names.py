@@ -43,11 +43,11 @@ class FormerNames(MetaPathFinder, Loader):
         former = module.__name__
         name = former.removeprefix("tussle.")
         present = f"tussle.{FORMER[name.partition('.')[0]]}.{name}"
-        warnings.warn(
-            f"{former} is {present} now; the former name goes in version {GOES_IN}",
-            DeprecationWarning,
-            stacklevel=2,
-        )
+        package, _, last = present.rpartition(".")
+        if last == "plugin" and not hasattr(import_module(package), "__path__"):
+            present = package  # a plugin that was a folder and is a file now
+        text = f"{former} is {present} now; the former name goes in version {GOES_IN}"
+        warnings.warn(text, DeprecationWarning, stacklevel=2)
         sys.modules[former] = import_module(present)
 
 

@@ -20,7 +20,7 @@ EXAMPLE_STEPS = 100
 EXTRAS = {"interaction/graph_interaction": "networkx", "interaction/map_gen_2d": "PIL"}
 """Package that an example needs, of those that `import tussle` does not."""
 JSBSIM = ("controller/jsbsim_controllers", "motion/jsbsim_model")
-"""Folders whose examples are flown by JSBSim, so that their hashes depend on the machine; tests/unit/jsbsim plays them."""
+"""Plugins whose examples are flown by JSBSim, so that their hashes depend on the machine; tests/unit/jsbsim plays them."""
 LEARNED = ("autonomy/learned",)
 """Likewise by a policy in onnxruntime; tests/unit/stock/test_learned.py plays it."""
 SERVED = (
@@ -31,13 +31,13 @@ SERVED = (
     "autonomy/ros_autonomy/ros2", "interaction/ros_clock_server/ros2",
     "sensor/ros_compass/ros2", "sensor/ros_imu_sensor/ros2",
 )  # fmt: skip
-"""Folders whose examples need a server or peers; tests of their own play them."""
+"""Plugins whose examples need a server or peers; tests of their own play them."""
 
 
 @cache
 def examples() -> tuple[str, ...]:
-    """Folders of the plugins whose examples can be played with the installed packages."""
-    names = sorted({path.parent.relative_to(STOCK).as_posix() for path in stock.examples().values()})
+    """Modules of the plugins whose examples can be played with the installed packages."""
+    names = sorted({module_of(path) for path in stock.examples().values()})
     return tuple(
         n
         for n in names
@@ -45,9 +45,21 @@ def examples() -> tuple[str, ...]:
     )
 
 
+def module_of(example: Path) -> str:
+    """Module of a plugin, such as "autonomy/boids": a folder with its example, or a file with the example beside it."""
+    path = example.parent if example.name == "example.xml" else example.with_suffix("")
+    return path.relative_to(STOCK).as_posix()
+
+
+def example_of(module: str) -> Path:
+    """Return the example of a module."""
+    folder = STOCK / module
+    return folder / "example.xml" if folder.is_dir() else folder.with_suffix(".xml")
+
+
 def play_example(name: str, seeds=1) -> list[str]:
     """State hash of each world after the first steps of an example, which is read without notes."""
-    loaded = read_mission(STOCK / name / "example.xml")
+    loaded = read_mission(example_of(name))
     assert loaded.notes == ()
     with Simulation(loaded.mission, seeds=seeds, on_error="raise") as sim:
         sim.step(EXAMPLE_STEPS)
@@ -61,7 +73,7 @@ def play_examples(every: int = 1) -> dict[str, str]:
 
 @cache
 def kept_examples() -> dict[str, str]:
-    """Folder of a plugin -> hash of its example."""
+    """Module of a plugin -> hash of its example."""
     return json.loads(FILE.read_text(encoding="utf-8"))["examples"]
 
 

@@ -12,7 +12,7 @@ import warnings
 from pathlib import Path
 
 import numpy as np
-from golden_runs import STOCK
+from golden_runs import example_of, module_of
 
 from tussle import Simulation
 from tussle.engine.snapshot import hashed
@@ -27,7 +27,7 @@ JSBSIM = {"controller/jsbsim_controllers", "motion/jsbsim_model"}
 
 def folder_of(name: str) -> str:
     """Folder of the stock plugin whose example plays the historic plugin of this name."""
-    return stock.examples()[name].parent.relative_to(STOCK).as_posix()
+    return module_of(stock.examples()[name])
 
 
 def folders() -> list[str]:
@@ -43,7 +43,7 @@ def _number(values: np.ndarray) -> float:
 
 def play(folder: str) -> tuple[float, set[str]]:
     """A number of all columns after the first steps of an example, and the historic classes that played."""
-    loaded = read_mission(STOCK / folder / "example.xml", compat="scrimmage")
+    loaded = read_mission(example_of(folder), compat="scrimmage")
     with warnings.catch_warnings(), Simulation(loaded.mission, seeds=1, on_error="raise") as sim:
         warnings.simplefilter("ignore")
         sim.step(STEPS)

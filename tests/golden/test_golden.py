@@ -14,7 +14,7 @@ from golden_runs import (
     JSBSIM,
     LEARNED,
     SERVED,
-    STOCK,
+    example_of,
     examples,
     final_hashes,
     golden,
@@ -47,7 +47,7 @@ def test_all_missions_are_kept():
     assert list(golden()) == list(NAMES)
     every = [one for mission_ in golden().values() for hashes in mission_.values() for one in hashes]
     assert len(set(every)) == len(every) == 2 * len(SEEDS) * len(NAMES)
-    assert {STOCK / name / "example.xml" for name in (*kept_examples(), *JSBSIM, *LEARNED, *SERVED)} == {
+    assert {example_of(name) for name in (*kept_examples(), *JSBSIM, *LEARNED, *SERVED)} == {
         *stock.examples().values()
     }
 

@@ -72,7 +72,7 @@ def test_a_stock_plugin_of_the_same_name_stays_what_it_is(pursuit, tmp_path):
     )
     again = read_mission(tmp_path / "o.xml", plugin_files=[tmp_path / "pursuer.py"]).mission
     assert again.blocks[0].autonomy == mission.blocks[0].autonomy
-    assert type(again.blocks[1].autonomy[0]).__module__ == "tussle.plugins.stock.autonomy.straight.plugin"
+    assert type(again.blocks[1].autonomy[0]).__module__ == "tussle.plugins.stock.autonomy.straight"
 
 
 def test_a_mission_names_no_code(pursuit):

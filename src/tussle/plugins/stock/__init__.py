@@ -38,9 +38,9 @@ def import_class(path: str) -> Any:
 @cache
 def examples() -> dict[str, Path]:
     """Map the name of each stock plugin to its example: a short mission file that shows what the plugin does."""
-    folder = Path(__file__).parent
-    modules = ((name, path.partition(":")[0]) for name, path in manifest().items())
-    return {name: folder.joinpath(*module.split(".")[3:], "example.xml") for name, module in modules}
+    modules = {name: path.partition(":")[0].split(".")[3:] for name, path in manifest().items()}
+    places = {name: Path(__file__).parent.joinpath(*module) for name, module in modules.items()}
+    return {n: p / "example.xml" if p.is_dir() else p.with_suffix(".xml") for n, p in places.items()}
 
 
 def load(name: str) -> Any:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from tussle.api import Children
 from tussle.plugins.stock.autonomy import command_string_relay
-from tussle.plugins.stock.autonomy.command_string_relay.plugin import TopicRelay
+from tussle.plugins.stock.autonomy.command_string_relay import TopicRelay
 
 
 class CommandStringRelay(command_string_relay.CommandStringRelay):

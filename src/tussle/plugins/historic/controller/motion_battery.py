@@ -7,7 +7,7 @@ import numpy as np
 from tussle.api import GroupView, Publish
 from tussle.declare.messages import RemoveEntity
 from tussle.plugins.stock.controller import motion_battery
-from tussle.plugins.stock.controller.motion_battery.plugin import depletions
+from tussle.plugins.stock.controller.motion_battery import depletions
 
 
 class MotionBattery(motion_battery.MotionBattery):

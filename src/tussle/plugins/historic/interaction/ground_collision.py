@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from tussle.api import WorldView
-from tussle.plugins.stock.interaction.ground_collision.plugin import Ground
+from tussle.plugins.stock.interaction.ground_collision import Ground
 
 
 class GroundCollision(Ground):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from tussle.api import HistoricAttributes, Param
-from tussle.plugins.stock.sensor.los_sensor import plugin as stock
+from tussle.plugins.stock.sensor import los_sensor as stock
 
 
 class LOSSensor(stock.LOSSensor):

@@ -1,5 +1,0 @@
-"""BoundaryDefense: intercepts intruders in a region."""
-
-from tussle.plugins.stock.autonomy.boundary_defense.plugin import BoundaryDefense
-
-__all__ = ["BoundaryDefense"]

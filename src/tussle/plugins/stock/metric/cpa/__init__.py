@@ -1,5 +1,0 @@
-"""CPA: closest point of approach."""
-
-from tussle.plugins.stock.metric.cpa.plugin import CPA
-
-__all__ = ["CPA"]

@@ -1,5 +1,0 @@
-"""Counts captures."""
-
-from tussle.plugins.stock.metric.simple_capture_metrics.plugin import SimpleCaptureMetrics
-
-__all__ = ["SimpleCaptureMetrics"]

@@ -1,5 +1,0 @@
-"""Ballistic: a mass in free fall."""
-
-from tussle.plugins.stock.motion.ballistic.plugin import Ballistic
-
-__all__ = ["Ballistic"]

@@ -1,5 +1,0 @@
-"""DepthCamera: small depth and segmentation images."""
-
-from tussle.plugins.stock.sensor.depth_camera.plugin import DepthCamera
-
-__all__ = ["DepthCamera"]

@@ -1,5 +1,0 @@
-"""SimpleINS: inertial navigation that drifts."""
-
-from tussle.plugins.stock.sensor.simple_ins.plugin import SimpleINS
-
-__all__ = ["SimpleINS"]
