@@ -17,6 +17,7 @@ from parity_page import PAGE as PARITY
 from parity_page import parity_page
 from plugin_pages import FOLDER, plugin_pages
 from reference import PAGE, reference
+from rooms import PICTURE, picture
 
 
 def game() -> str:
@@ -48,6 +49,7 @@ def main() -> None:
         page.write_text(text)
     PAGE.write_text(reference())
     PARITY.write_text(parity_page())
+    PICTURE.write_text(picture())
     FOLDER.mkdir(exist_ok=True)
     for page, text in plugin_pages().items():
         page.write_text(text)
