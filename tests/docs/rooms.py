@@ -67,7 +67,7 @@ def picture() -> str:
             "<title>The packages of tussle on their floors, with arrows to what each imports</title>",
             "<style>rect{fill:#eef3f8;stroke:#5b7083}line{stroke:#5b7083;marker-end:url(#end)}",
             "text{font:12px sans-serif;text-anchor:middle;fill:#222}.name{font-weight:bold;font-size:14px}</style>",
-            '<marker id="end" viewBox="0 0 8 8" refX="7" refY="4" markerWidth="8" markerHeight="8" orient="auto">'
+            '<marker id="end" viewBox="0 0 8 8" refX="7" refY="4" markerWidth="8" markerHeight="8" orient="auto">',
             '<path d="M0 0 8 4 0 8z" fill="#5b7083"/></marker>',
             f'<path d="M0 0H{total}V{height}H0z" fill="#fff"/>',
             *drawn,
