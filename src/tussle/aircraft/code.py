@@ -15,6 +15,7 @@ import numpy as np
 
 from tussle.aircraft.node import AircraftError, Element
 from tussle.errors import nearest_name
+from tussle.numeric.source import INDENT
 
 MOST_LINES = 40_000
 NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\Z")
@@ -280,4 +281,4 @@ class Code:
         """Lines of a section."""
         for line in self.sections[name].lines:
             if not line.name or self.is_used(line.name):
-                yield "    " * (depth + line.depth) + line.text
+                yield INDENT * (depth + line.depth) + line.text

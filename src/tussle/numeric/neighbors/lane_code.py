@@ -29,6 +29,7 @@ from tussle.numeric.kernel import Device, device
 from tussle.numeric.neighbors import lanes
 from tussle.numeric.neighbors.lane_count import LANES
 from tussle.numeric.rk4 import label
+from tussle.numeric.source import define, indented
 
 ARITHMETIC = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/"}
 COMPARISONS = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!="}
@@ -90,14 +91,9 @@ def lane_code(function: Callable[..., Any], inside: tuple[Any, ...] = ()) -> Lan
     if result is None:
         raise writer.refusal(writer.tree, "it returns no value")
     names = [value.name for value in result.values] + ([result.counts] if result.counts else [])
-    text = "\n    ".join([
-        f"def {writer.tree.name}({', '.join(a.arg for a in writer.tree.args.args)}):",
-        *writer.lines,
-        f"return ({', '.join(names)},)",
-    ])  # fmt: skip
-    exec(text + "\n", writer.scope)  # noqa: S102 - the text above is generated from a checked tree
-    made = writer.scope[writer.tree.name]
-    made.__module__, made.__qualname__ = function.__module__, f"{function.__qualname__}.lanes"
+    head = f"def {writer.tree.name}({', '.join(a.arg for a in writer.tree.args.args)}):"
+    lines = [head, *indented(1, [*writer.lines, f"return ({', '.join(names)},)"])]
+    made = define(lines, writer.scope, function.__module__, f"{function.__qualname__}.lanes")
     return LaneCode(device(made), tuple(value.is_mask for value in result.values), bool(result.counts))
 
 
