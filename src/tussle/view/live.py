@@ -15,12 +15,13 @@ from tussle.engine.result import WorldResult
 from tussle.engine.simulation import Simulation
 from tussle.engine.step_end import world_result
 from tussle.errors import ParameterError, PluginError
+from tussle.pacing import Pace
 from tussle.view.curves import GameCurves
 from tussle.view.drawn import DrawCollector, Shape
 from tussle.view.entity import EntityState, entity_state
 from tussle.view.frame import Event, Frame, Lens
 from tussle.view.latest import LINGER, LatestValue
-from tussle.view.pacing import Pace, checked_warp, faster, slower
+from tussle.view.pacing import checked_warp, faster, slower
 from tussle.view.playback import Order, PlaybackController
 from tussle.view.player import Injection, Player
 from tussle.view.scenery import Scenery, scenery_of

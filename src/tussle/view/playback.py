@@ -12,8 +12,9 @@ from typing import Any
 
 from tussle.declare.messages import Message
 from tussle.errors import PluginError, TussleError
+from tussle.pacing import Pace
 from tussle.view.drawn import DrawCollector
-from tussle.view.pacing import Pace, Speedometer
+from tussle.view.pacing import Speedometer
 from tussle.view.player import Player
 
 LONGEST_WAIT = 60.0

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tussle.errors import ParameterError
+from tussle.pacing import POLL_PERIOD
 from tussle.record.run_file import mission_entry
 from tussle.view.curves import numbers_of
 from tussle.view.frame import Event, Frame
@@ -34,8 +35,6 @@ PERIOD = 1.0 / 30.0
 """Least time between two frames [s]."""
 STATUS_PERIOD = 0.25
 """Time between two readings of what nobody reads faster: numbers, notes, events, the chosen entity [s]."""
-NAP = 0.1
-"""While nobody watches [s]."""
 MOST_MESSAGES = 200
 """From one browser in a second, and at once. More wait."""
 MOST_EVENTS = 2000
@@ -140,7 +139,7 @@ class FramePublisher:
                     self._make_drawing()
                 for reader in self.readers:
                     reader.wake.set()
-            await asyncio.sleep(self._period if self.readers else NAP)
+            await asyncio.sleep(self._period if self.readers else POLL_PERIOD)
 
     def _make_frame(self) -> None:
         frame, epoch = self._live.frame(), self._live.epoch

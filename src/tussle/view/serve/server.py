@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING, Any, Self, TypeVar
 
 from tussle.engine.simulation import Simulation
 from tussle.errors import MissingExtraError, ParameterError, TussleError, listed, nearest_name
-from tussle.view.pacing import Pace, checked_warp
+from tussle.pacing import Pace
+from tussle.view.pacing import checked_warp
 from tussle.view.page.access import MOST_BROWSERS, Access, bound_socket
 from tussle.view.page.web_server import WebServer
 from tussle.view.serve.session import ENCODINGS, Session, encoded

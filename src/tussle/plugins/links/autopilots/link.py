@@ -10,14 +10,13 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Sequence
 
 from tussle.errors import ParameterError
+from tussle.pacing import Pace
 from tussle.plugins.links.autopilots.frames import VehicleState
 
-NAP = 0.01
-"""Longest wait before the clock, an interruption and the connections are looked at [s]."""
+TICK_PERIOD = 0.01
+"""Longest wait before a state is sent again [s]."""
 LONGEST_STEP = 1.0
 """Wall time of a step beyond which the simulation is paused, or waits for another autopilot [s]."""
-CATCH_UP = 0.2
-"""How far a simulation may lag behind the clock before the lag is forgotten [s]."""
 MOST_PORT = 65535
 
 
@@ -167,20 +166,14 @@ def await_links(links: Sequence[AutopilotLink], is_interrupted: Callable[[], boo
         for link in waiting:
             for each in link.sockets():
                 poller.register(each, select.POLLIN)
-        poller.poll(math.ceil(1000.0 * min(NAP, limit - now)))
+        poller.poll(math.ceil(1000.0 * min(TICK_PERIOD, limit - now)))
 
 
 class StepClock:
     """The clock of a simulation that runs beside its autopilots."""
 
-    def __init__(self) -> None:
-        self._start = -math.inf
+    def __init__(self, warp: float) -> None:
+        self.pace = Pace(warp)
 
     def end(self) -> None:
         """Nothing is open."""
-
-    def wait(self, t: float, is_interrupted: Callable[[], bool]) -> None:
-        """Wait until a time [s] since the start; a lag of more than `CATCH_UP` is forgotten."""
-        self._start = max(self._start, time.monotonic() - t - CATCH_UP)
-        while (left := self._start + t - time.monotonic()) > 0.0 and not is_interrupted():
-            time.sleep(min(left, NAP))

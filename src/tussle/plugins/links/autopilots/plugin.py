@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Callable, Iterable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -81,9 +82,8 @@ class Autopilot(Autonomy):
         links: list[Any] = list(self.link)
         is_interrupted = g.context.is_interrupted
         if links and not self.lockstep:
-            g.context.share("autopilots' clock", StepClock).wait(
-                float(g.t[0]) / self.time_warp, is_interrupted
-            )
+            clock = g.context.share(("autopilots' clock", self.time_warp), partial(StepClock, self.time_warp))
+            clock.pace.hold(float(g.t[0]), g.dt, is_interrupted)
         states, draws = vehicle_states(g, self.last_vel), self.draws(g).T.tolist()
         for link, state, own in zip(links, states, draws, strict=True):
             link.begin(state, own)

@@ -154,7 +154,7 @@ class MOOSAutonomy(Autonomy):
             vessel.await_helm(limit)
         if not self.lockstep:
             for vessel in vessels:
-                vessel.await_clock(g.dt)
+                vessel.await_clock(float(g.t[0]), g.dt)
         self._publish(g, vessels)
         if self.lockstep:
             limit = time.monotonic() + self.timeout

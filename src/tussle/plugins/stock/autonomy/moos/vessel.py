@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable
 
 from tussle.declare import texts
+from tussle.pacing import Pace
 from tussle.plugins.stock.autonomy.moos import wire
 from tussle.plugins.stock.autonomy.moos.client import MoosClient
 from tussle.plugins.stock.autonomy.moos.mission_file import MoosCommunity
@@ -17,8 +18,6 @@ DEPLOYMENT = {"DEPLOY": "true", "RETURN": "false", "MOOS_MANUAL_OVERRIDE": "fals
 """What a helm is told when it is heard for the first time."""
 MALCONFIG = "MALCONFIG"
 """State of a helm that does not understand its configuration; it never steers."""
-CATCH_UP = 0.2
-"""How far a simulation may lag behind the clock before the lag is forgotten [s]."""
 PER_STEP = 32
 """Messages that a helm may send for each step that it answers."""
 
@@ -50,7 +49,7 @@ class Vessel:
     ) -> None:
         self.timeout, self.lockstep, self.time_warp = timeout, lockstep, community.time_warp
         self.reported, self._release = -math.inf, release
-        self._due, self._goes_on = 0.0, on_loss == "go_on"
+        self._pace, self._goes_on = Pace(self.time_warp), on_loss == "go_on"
         self._sent: list[bytes] = []
         self._has_begun, self._n_lost = False, 0
         self._state = ""
@@ -82,12 +81,11 @@ class Vessel:
             self._await(lambda: bool(self._state), limit, "no helm has been heard")
             self._has_begun = True
 
-    def await_clock(self, dt: float) -> None:
-        """Wait until the clock has moved by dt of the world since the last call."""
-        now = time.monotonic()
-        self._due = max(self._due + dt / self.time_warp, now - CATCH_UP) if self._due else now
+    def await_clock(self, t: float, dt: float) -> None:
+        """Wait until simulated time t is due, where the last call was for t - dt."""
+        left = self._pace.due_in(t, dt)
         with self.client.changed:
-            self.client.changed.wait_for(lambda: bool(self.failure), max(self._due - now, 0.0))
+            self.client.changed.wait_for(lambda: bool(self.failure), max(left, 0.0))
         if self._state and time.monotonic() - self._heard > self.timeout:
             self.client.fail(f"the helm has been silent for {self.timeout:g} s{self._state_text()}")
 

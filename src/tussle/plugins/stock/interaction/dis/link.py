@@ -5,13 +5,12 @@ from __future__ import annotations
 import ipaddress
 import math
 import socket
-import time
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from tussle.errors import ParameterError
+from tussle.pacing import Pace
 from tussle.plugins.stock.interaction.dis import pdu
 from tussle.world.geodesy import Origin
 
@@ -19,8 +18,6 @@ MOST_DATAGRAMS = 20_000
 """Read at once; with more, a flood would hold the simulation up."""
 RECEIVE_BUFFER = 4 * 1024 * 1024  # [byte] the system may give less
 BROADCAST = ".255"
-NAP = 0.05  # [s] longest wait before Ctrl-C is noticed
-CATCH_UP = 0.25  # [s] a larger delay is not caught up with
 MOST_BYTES = 65536
 MOST_SPEED, MOST_RATE = 1e5, 1e3
 """Largest component of a velocity [m/s] or acceleration [m/s^2], and of an angular velocity [rad/s], that is believed."""
@@ -50,22 +47,24 @@ class ExerciseLink:
         port: Its port.
         listen_address: Address on which PDUs are received: an own one, a broadcast address, or with multicast that of the interface.
         listen_port: Port on which they are received; 0 for none.
+        warp: Simulated seconds per second of its pace.
 
     Attributes:
         remotes: Number of site, application and entity, as one -> entity of another simulator, in order of arrival.
         sent: Id of an entity of this world -> its last PDU.
         stamp: Timestamp of PDUs of this step.
+        pace: Its clock.
         n_sent: PDUs sent; n_received and n_refused likewise.
 
     Raises:
         ParameterError: An address is not known, or the port is taken.
     """
 
-    def __init__(self, address: str, port: int, listen_address: str, listen_port: int) -> None:
+    def __init__(self, address: str, port: int, listen_address: str, listen_port: int, warp: float) -> None:
         self.remotes: dict[int, Remote] = {}
         self.sent: dict[int, tuple[np.ndarray, float]] = {}
         self.n_sent = self.n_received = self.n_refused = 0
-        self.stamp, self._due, self._t = 0, 0.0, -math.inf
+        self.stamp, self.pace, self._t = 0, Pace(warp), -math.inf
         self._listens = bool(listen_port)
         self._place = (_resolved("address", address), port)
         own = _resolved("listen_address", listen_address)
@@ -172,13 +171,6 @@ class ExerciseLink:
         self.send(gone)
         for number in numbers:
             del self.sent[number]
-
-    def await_clock(self, dt: float, is_interrupted: Callable[[], bool]) -> None:
-        """Wait until the clock has moved by dt [s] since the last call."""
-        now = time.monotonic()
-        self._due = max(self._due + dt, now - CATCH_UP) if self._due else now
-        while (left := self._due - time.monotonic()) > 0.0 and not is_interrupted():
-            time.sleep(min(left, NAP))
 
     def end(self) -> None:
         """Say that all entities are gone, and close the socket; called when the simulation is closed."""

@@ -100,7 +100,7 @@ class DIS(Interaction):
         """Move the remote entities, and send the own ones."""
         link, t = self._link(w), float(w.t[0])
         if self.time_warp:
-            link.await_clock(w.dt / self.time_warp, w.context.is_interrupted)
+            link.pace.hold(t, w.dt, w.context.is_interrupted)
         link.begin(t)
         own = self.site << 16 | self.application
         link.receive(t, self.exercise, own, w.scene.origin, self.reach, self.most_remote)
@@ -112,7 +112,7 @@ class DIS(Interaction):
         self._send(w, link, np.flatnonzero(~is_remote & (w.world == 0)), t)
 
     def _link(self, w: WorldView) -> ExerciseLink:
-        places = self.address, self.port, self.listen_address, self.listen_port
+        places = self.address, self.port, self.listen_address, self.listen_port, self.time_warp
         link: ExerciseLink = w.context.share((DIS, self.instance_name), partial(ExerciseLink, *places))
         return link
 
