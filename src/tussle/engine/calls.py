@@ -84,7 +84,7 @@ class Schedule(Sequence[Call]):
             raise ParameterError(
                 f"before = {before!r}, after = {after!r}: exactly one of them is a name of a call"
             )
-        label = name or getattr(call, "__name__", type(call).__name__)
+        label = name or str(getattr(call, "__name__", type(call).__name__))
         owner = self._owner
 
         def run() -> None:
