@@ -13,7 +13,7 @@ from typing import Any
 from tussle.checksums import BLANK, MARK, is_intact, sealed
 from tussle.errors import ParameterError, TussleError, listed, nearest_name
 
-MOST_BYTES = 1 << 25
+MAX_BYTES = 1 << 25
 """Maximum size of a document. Parsed JSON takes up to about twenty times as much memory."""
 LONGEST_SHOWN = 80
 CHECKSUM = "checksum"
@@ -35,7 +35,7 @@ def size_of(path: Path, most: int | None = None) -> int:
     return about.st_size
 
 
-def read_bytes(path: Path, error: type[TussleError], most: int = MOST_BYTES) -> bytes:
+def read_bytes(path: Path, error: type[TussleError], most: int = MAX_BYTES) -> bytes:
     """Read a file. All files that a mission names are read by this function, or by `read_text`.
 
     Raises:
@@ -49,7 +49,7 @@ def read_bytes(path: Path, error: type[TussleError], most: int = MOST_BYTES) -> 
         raise error(f"{path}: cannot be read: {getattr(reason, 'strerror', None) or reason}") from None
 
 
-def read_text(path: Path, error: type[TussleError], most: int = MOST_BYTES) -> str:
+def read_text(path: Path, error: type[TussleError], most: int = MAX_BYTES) -> str:
     """Read a UTF-8 text file.
 
     Raises:

@@ -16,7 +16,7 @@ import numpy as np
 from tussle.errors import ParameterError, listed, nearest_name
 
 LONGEST_TEXT = 200
-MOST_LISTED = 12
+MAX_LISTED = 12
 SHARES = ("wins", "ties")
 OPERATORS = (ast.Add, ast.Sub, ast.Mult, ast.Div)
 TAKES = "it takes names as score[2], ties or CPA.cpa[1], numbers, + - * / and parentheses"
@@ -186,7 +186,7 @@ def _column(metric: str, team: int | None, text: str, columns: Collection[str]) 
     if team is None and of_teams:
         raise ParameterError(f"quantity {text!r}: {name!r} needs a team; {listed(of_teams)}")
     known = of_teams or list(columns)
-    more = f" and {len(known) - MOST_LISTED} more" if len(known) > MOST_LISTED else ""
+    more = f" and {len(known) - MAX_LISTED} more" if len(known) > MAX_LISTED else ""
     raise ParameterError(
-        f"quantity {text!r}: there is no {name!r}{nearest_name(name, columns)}; {listed(known[:MOST_LISTED])}{more}"
+        f"quantity {text!r}: there is no {name!r}{nearest_name(name, columns)}; {listed(known[:MAX_LISTED])}{more}"
     )

@@ -25,7 +25,7 @@ FEWEST_LEVELS = 3
 """A choice of numbers is a number if it has at least so many, else a choice like any other."""
 WIDE_RATIO = 50.0
 """Numbers whose largest ratio is at least this are fitted by their logarithm."""
-MOST_POINTS = 400
+MAX_POINTS = 400
 """Of more points so many are fitted, evenly spaced by number: the fit takes the third power of it."""
 PRIOR_DEGREES = 4.0
 """Degrees of freedom with which the spread over all points counts into that of a point with few runs."""
@@ -207,7 +207,7 @@ def fitted(
             f"{what} cannot be fitted over {'what varies' if axes else 'nothing that varies'}: "
             f"{len(chosen)} points have runs, and a fit takes {FEWEST_POINTS} that differ"
         )
-    chosen = thinned(chosen, MOST_POINTS)
+    chosen = thinned(chosen, MAX_POINTS)
     known = PointMeans(means.mean[chosen], means.variance[chosen], means.common)
     n = np.isfinite(matrix).sum(axis=0)[chosen]
     at = [points[i] for i in chosen.tolist()]

@@ -16,7 +16,7 @@ from tussle.batch.variables import Variable
 from tussle.errors import MissingExtraError
 
 N_RESAMPLES = 200
-MOST_LEVELS = 30
+MAX_LEVELS = 30
 """Largest number of levels of a factor in an analysis of variance."""
 
 Points = Sequence[dict[str, Any]]
@@ -231,7 +231,7 @@ def as_factorial(columns: Sequence[Sequence[Any]], matrix: np.ndarray) -> np.nda
     """
     codes = [{value: i for i, value in enumerate(dict.fromkeys(column))} for column in columns]
     shape, n_points = tuple(map(len, codes)), matrix.shape[1]
-    if min(shape) < 2 or max(shape) > MOST_LEVELS or np.prod(shape, dtype=float) != n_points:
+    if min(shape) < 2 or max(shape) > MAX_LEVELS or np.prod(shape, dtype=float) != n_points:
         return None
     level = [np.array([code[v] for v in column]) for code, column in zip(codes, columns, strict=True)]
     place = np.ravel_multi_index(tuple(level), shape)

@@ -30,7 +30,7 @@ WHOLE_VALUE = re.compile(r"[-+]?\d{1,19}", re.ASCII)
 LARGEST_WHOLE = 10**15
 """Up to here a whole number plus one half is a float."""
 
-MOST_LEVELS = 1_000_000
+MAX_LEVELS = 1_000_000
 
 SHOWN_DIGITS = 12
 """Significant digits of a range's width in its values: enough to tell any two apart, few enough to be typed."""
@@ -103,8 +103,8 @@ class Range:
             return f"levels are a whole number, not {levels!r}"
         n = int(levels)
         object.__setattr__(self, "levels", n)
-        if not 2 <= n <= MOST_LEVELS:
-            return f"{n} levels are not allowed; a range takes 2 to {MOST_LEVELS:,}"
+        if not 2 <= n <= MAX_LEVELS:
+            return f"{n} levels are not allowed; a range takes 2 to {MAX_LEVELS:,}"
         if self.is_int and len(set(self.spread(n))) < n:
             return f"there are no {n} different whole numbers spread over the range; ask for fewer levels"
         return ""

@@ -10,7 +10,7 @@ from tussle.declare import units
 from tussle.errors import ParameterError
 
 TRUE, FALSE = ("true", "1", "yes", "on"), ("false", "0", "no", "off")
-MOST_ITEMS = 100_000
+MAX_ITEMS = 100_000
 """Maximum count of numbers in one value."""
 LONGEST_SHOWN = 80
 ROW = re.compile(r"\s*\[([^\[\]]*)\]")

@@ -9,12 +9,12 @@ from typing import NamedTuple
 from tussle.declare.texts import LONGEST_SHOWN, shown
 from tussle.errors import MissionError, listed, nearest_name
 
-MOST_LINES = 100
+MAX_LINES = 100
 """Maximum number of errors, and of notes; a file with more is most likely not a mission."""
 
 LONGEST_REPAIRED = 200
 """Characters of a repaired line in a message."""
-MOST_GUESSED = 1000
+MAX_GUESSED = 1000
 """Maximum number of names that are searched for the nearest one."""
 
 
@@ -64,14 +64,14 @@ class Problems:
             MissionError: There are too many errors.
         """
         self._errors.setdefault(text, []).append(place)
-        if len(self._errors) >= MOST_LINES:
+        if len(self._errors) >= MAX_LINES:
             self._errors["reading stopped here; there may be more errors"] = [place]
             self.check()
 
     def absent(self, place: Place, what: str, name: str, known: Collection[str]) -> None:
         """Add an error about a name that the file does not define. The slow search for the nearest name is done once per name."""
         if (what, name) not in self._absent:
-            some = list(islice(known, MOST_GUESSED))
+            some = list(islice(known, MAX_GUESSED))
             more = ", ..." if len(known) > len(some) else ""
             guess = nearest_name(name[:LONGEST_SHOWN], some)
             self._absent[what, name] = f"there is no {what} {shown(name)}{guess}; {listed(some)}{more}"
@@ -79,7 +79,7 @@ class Problems:
 
     def note(self, place: Place, text: str) -> None:
         """Add a note, a message about the file that is not an error."""
-        if len(self._notes) < MOST_LINES or text in self._notes:
+        if len(self._notes) < MAX_LINES or text in self._notes:
             self._notes.setdefault(text, []).append(place)
         else:
             self._n_omitted += 1
@@ -88,7 +88,7 @@ class Problems:
         self, place: Place, what: str, name: str, allowed: Iterable[str], *, lists: bool = False
     ) -> None:
         """Add an error about an unknown tag or attribute; a note if the reading is lenient and the file has it."""
-        if not self.strictness.is_strict and len(self._notes) >= MOST_LINES:
+        if not self.strictness.is_strict and len(self._notes) >= MAX_LINES:
             self._n_omitted += 1  # skips the search for the nearest name, which is slow
             return
         if (what, name) not in self._unknown:
@@ -119,7 +119,7 @@ class Problems:
     def _mends(self, text: str) -> dict[str, list[Place]]:
         return {
             f"{what}; {text} {shown(repaired, LONGEST_REPAIRED)}": places
-            for what, (repaired, places) in islice(self._mended.items(), MOST_LINES)
+            for what, (repaired, places) in islice(self._mended.items(), MAX_LINES)
         }
 
     @property

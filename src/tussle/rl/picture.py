@@ -24,7 +24,7 @@ from tussle.view.scenery import scenery_of
 from tussle.view.style import Style
 
 SIZE = (640, 480)
-LEAST_HALF = 1.0
+MIN_HALF = 1.0
 """Least half of the height that a picture shows [m]."""
 
 
@@ -56,7 +56,7 @@ class WorldCamera:
         frame = self._lens.frame()
         pos = frame.pos if len(frame) else np.zeros((1, 3))
         low, high = pos.min(axis=0), pos.max(axis=0)
-        half = max(0.5 * float(np.linalg.norm(high - low)) / MARGIN, LEAST_HALF)
+        half = max(0.5 * float(np.linalg.norm(high - low)) / MARGIN, MIN_HALF)
         middle, seen = 0.5 * (low + high), 2.0 * half * self._aspect
         spacing = seen / math.sqrt(len(pos) + 1.0)
         length = float(np.clip(spacing, SMALLEST * seen, LARGEST * seen))

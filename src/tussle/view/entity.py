@@ -19,7 +19,7 @@ from tussle.engine.table import Stored, Table
 
 _COMPONENTS = {3: ("x", "y", "z"), 4: ("w", "x", "y", "z")}
 """Names of the components of a vector and of a quaternion."""
-MOST_MESSAGES = 50
+MAX_MESSAGES = 50
 """Messages that are listed, of received and of sent ones."""
 
 
@@ -179,7 +179,7 @@ def _heard(group: Group, world: int, who: int) -> list[ShownMessage]:
                 inbox = binding.plugin.__dict__[name]
                 for delivery in inbox.deliveries:
                     messages += _messages(inbox.topic, delivery, _for_whom(delivery, world, who))
-    return messages[-MOST_MESSAGES:]
+    return messages[-MAX_MESSAGES:]
 
 
 def _for_whom(delivery: Delivery, world: int, who: int) -> np.ndarray:
@@ -199,7 +199,7 @@ def _said(simulation: Simulation, world: int, who: int) -> list[ShownMessage]:
         for delivery in _under_way(topic):
             mine = (delivery.batch.world == world) & (delivery.batch.sender == who)
             messages += _messages(topic, delivery, np.flatnonzero(mine))
-    return messages[-MOST_MESSAGES:]
+    return messages[-MAX_MESSAGES:]
 
 
 def _under_way(topic: TopicBuffer) -> Iterator[Delivery]:
@@ -213,7 +213,7 @@ def _under_way(topic: TopicBuffer) -> Iterator[Delivery]:
 def _messages(topic: TopicBuffer, delivery: Delivery, numbers: np.ndarray) -> list[ShownMessage]:
     batch = delivery.batch
     messages = []
-    for i in numbers[-MOST_MESSAGES:]:
+    for i in numbers[-MAX_MESSAGES:]:
         fields: dict[str, Any] = {}
         for name, values in batch.data.items():
             if isinstance(values, RaggedColumn):

@@ -20,12 +20,12 @@ from tussle.batch.statistics import sign_test
 from tussle.batch.target import Answers
 from tussle.batch.variables import Range
 
-MOST_ASKED = 2
+MAX_ASKED = 2
 """Numbers and choices that are asked for by name, each."""
-MOST_CAUSES = 4
+MAX_CAUSES = 4
 N_ALONG = 41
-MOST_OF_IT = 0.9
-MOST_LINES_SAID = 3
+MAX_OF_IT = 0.9
+MAX_LINES_SAID = 3
 """A choice with at most so many values is told apart where most of a change is done."""
 LITTLE, MUCH = 0.2, 0.6
 """Parts of the variance below which chance plays a small part, and above which it plays the largest."""
@@ -52,8 +52,8 @@ def answers(data: ReportData) -> list[ShortAnswer]:
         return []
     lead = data.measures[0]
     ranked = data.by_strength(lead) if data.axes else []
-    choices = [axis for axis in ranked if not axis.is_number][:MOST_ASKED]
-    amounts = [axis for axis in ranked if axis.is_number][:MOST_ASKED]
+    choices = [axis for axis in ranked if not axis.is_number][:MAX_ASKED]
+    amounts = [axis for axis in ranked if axis.is_number][:MAX_ASKED]
     found = [
         *(ShortAnswer(f"Which {_short(data, a)}?", text) for a in choices if (text := _which(data, lead, a))),
         *(ShortAnswer(_how_many(data, a), text) for a in amounts if (text := _how_it_goes(data, lead, a))),
@@ -209,12 +209,12 @@ def _most_of_it(data: ReportData, response: Response, axis: FittedVariable, at: 
     """Where nine tenths of the change from the first place to the extreme one are done, for each value of a choice."""
     lines, texts = data.lines, []
     held: list[dict[str, Any]] = [{}]
-    if lines is not None and len(lines.values) <= MOST_LINES_SAID:
+    if lines is not None and len(lines.values) <= MAX_LINES_SAID:
         held = [{lines.variable.name: value} for value in lines.values]
     for given in held:
         value = response.along(axis.variable.name, at, given).value
         change = np.abs(value - value[0])
-        place = number(float(f"{at[int(np.argmax(change >= MOST_OF_IT * change.max()))]:.4g}"))
+        place = number(float(f"{at[int(np.argmax(change >= MAX_OF_IT * change.max()))]:.4g}"))
         texts.append(" with ".join([place, *map(written, given.values())]))
     return " and ".join(texts)
 
@@ -231,7 +231,7 @@ def _what_matters(data: ReportData, lead: Measure) -> str:
     ]
     if parts:
         texts = []
-        for name, part, low, high in sorted(parts, key=lambda p: -(p[1] or 0.0))[:MOST_CAUSES]:
+        for name, part, low, high in sorted(parts, key=lambda p: -(p[1] or 0.0))[:MAX_CAUSES]:
             is_known = low is not None and high is not None
             ends = f" ({100.0 * max(low, 0.0):.0f} to {100.0 * min(high, 1.0):.0f})" if is_known else ""  # type: ignore[type-var,operator]
             who = {"seed": "the seed", "unexplained": "what none of them explains"}.get(name, name)
@@ -243,7 +243,7 @@ def _what_matters(data: ReportData, lead: Measure) -> str:
     ranks = sorted((e for e in effects if strength_of(e) is not None), key=lambda e: -(strength_of(e) or 0.0))
     if not ranks:
         return ""
-    texts = [f"{e.variable} {estimate(e.rank_correlation)}" for e in ranks[:MOST_CAUSES]]
+    texts = [f"{e.variable} {estimate(e.rank_correlation)}" for e in ranks[:MAX_CAUSES]]
     return f"Rank correlation with {_low(data, lead)}: {', '.join(texts)}; for parts of the variance there are too few points."
 
 

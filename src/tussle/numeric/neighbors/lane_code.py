@@ -33,14 +33,14 @@ from tussle.numeric.source import define, indented
 
 ARITHMETIC = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/"}
 COMPARISONS = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!="}
-MOST_POWER = 8
+MAX_POWER = 8
 ROOTS = (math.sqrt, np.sqrt)
 SIZES = (abs, math.fabs, np.abs)
 LANE_FUNCTIONS = (
     "splat", "choose", "truth", "number", "joined", "lane_of", "lanes_sqrt", "lanes_abs"
 )  # fmt: skip
 TAKES = (
-    f"supported are assignments, if, elif, else, return, + - * /, ** with a whole exponent from 1 to {MOST_POWER}, comparisons, and, or, "
+    f"supported are assignments, if, elif, else, return, + - * /, ** with a whole exponent from 1 to {MAX_POWER}, comparisons, and, or, "
     "not, x if c else y, abs, min, max, sqrt, the functions of tussle.numeric and math, and functions written with these"
 )
 
@@ -331,7 +331,7 @@ class Writer:
         """A binary operation on numbers."""
         if isinstance(node.op, ast.Pow):
             power = node.right.value if isinstance(node.right, ast.Constant) else None
-            if not isinstance(power, int) or not 1 <= power <= MOST_POWER:
+            if not isinstance(power, int) or not 1 <= power <= MAX_POWER:
                 raise self.refusal(node, f"`{ast.unparse(node)}` is not supported")
             base = self.number(self.value(node.left, env))
             return self.new(" * ".join([base] * power))

@@ -16,7 +16,7 @@ FARTHEST = 1e12
 LARGEST_ID = 2**31 - 1
 REACH = 1e3
 """Largest distance of a point of the world, in sizes of the scene."""
-MOST_WANTED = 64
+MAX_WANTED = 64
 """Quantities of the curves that one browser can choose."""
 CUSTOM_KEY = ";"
 """The key that is kept for the plugins, as in SCRIMMAGE."""
@@ -60,12 +60,12 @@ POINT = Check(
 WANTED = Check(
     lambda value: (
         isinstance(value, list)
-        and len(value) <= MOST_WANTED
+        and len(value) <= MAX_WANTED
         and all(
             isinstance(v, list) and len(v) == 2 and isinstance(v[0], str) and WHO.holds(v[1]) for v in value
         )
     ),
-    f"at most {MOST_WANTED} pairs of a name and an id",
+    f"at most {MAX_WANTED} pairs of a name and an id",
 )
 KEY = Check(lambda value: value == CUSTOM_KEY, f"the key {CUSTOM_KEY}")
 WARP = Check(

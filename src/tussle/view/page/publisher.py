@@ -35,17 +35,17 @@ PERIOD = 1.0 / 30.0
 """Least time between two frames [s]."""
 STATUS_PERIOD = 0.25
 """Time between two readings of what nobody reads faster: numbers, notes, events, the chosen entity [s]."""
-MOST_MESSAGES = 200
+MAX_MESSAGES = 200
 """From one browser in a second, and at once. More wait."""
-MOST_EVENTS = 2000
+MAX_EVENTS = 2000
 """Of one message."""
-MOST_CHANGES = 5000
+MAX_CHANGES = 5000
 """Of one message; those of one quantity are sent together, at most as many as are kept."""
 REFUSAL_PERIOD = 1.0
 """Least time between two messages about refused values [s]."""
 PAST_FRAMES, PAST_STATES = 120, 60_000
 """Of a look back, at most."""
-MOST_LOOKS = 4
+MAX_LOOKS = 4
 """Back, that wait to be sent to a browser."""
 
 
@@ -65,7 +65,7 @@ class Reader:
         self.wake.set()
         self.frame_sent = self.drawn_sent = 0
         self.status_due = 0.0
-        self.past: deque[bytes] = deque(maxlen=MOST_LOOKS)
+        self.past: deque[bytes] = deque(maxlen=MAX_LOOKS)
         self.refusal: str | None = None
         self.refused_at = -REFUSAL_PERIOD
         self.events_sent: list[Event] = []
@@ -171,7 +171,7 @@ class FramePublisher:
         try:
             while not socket.closed:
                 now = time.monotonic()
-                reader.free_at = max(reader.free_at, now - 1.0) + 1.0 / MOST_MESSAGES
+                reader.free_at = max(reader.free_at, now - 1.0) + 1.0 / MAX_MESSAGES
                 await asyncio.sleep(max(0.0, reader.free_at - now))
                 received = await socket.receive()
                 if received.data is None or socket.closed:
@@ -232,7 +232,7 @@ class FramePublisher:
         n = len(sent)
         if n > len(events) or (n and events[n - 1] is not sent[-1]):
             n = 0
-        new = events[n : n + MOST_EVENTS]
+        new = events[n : n + MAX_EVENTS]
         reader.events_sent = events[: n + len(new)]
         return {"from": n, "rows": event_rows(new)}
 
@@ -248,7 +248,7 @@ class FramePublisher:
                 continue
             sent, n_sent = reader.changes_sent.get(quantity, (None, 0))
             start, end = n_sent if sent is each else 0, len(each.values)
-            if (start == end and sent is each) or sum(len(c.t) for c in changes) > MOST_CHANGES:
+            if (start == end and sent is each) or sum(len(c.t) for c in changes) > MAX_CHANGES:
                 continue
             reader.changes_sent[quantity] = each, end
             t = [self._live.time_of(step) for step in each.steps[start:end]]

@@ -17,7 +17,7 @@ TICK_PERIOD = 0.01
 """Longest wait before a state is sent again [s]."""
 LONGEST_STEP = 1.0
 """Wall time of a step beyond which the simulation is paused, or waits for another autopilot [s]."""
-MOST_PORT = 65535
+MAX_PORT = 65535
 
 
 class AutopilotLink(ABC):
@@ -104,8 +104,8 @@ class OwnedPorts(dict[int, str]):
         """
         ports = tuple(ports)
         for port in ports:
-            if port in self or not 0 < port <= MOST_PORT:
-                why = f"is that of {self[port]}" if port in self else f"is not from 1 to {MOST_PORT}"
+            if port in self or not 0 < port <= MAX_PORT:
+                why = f"is that of {self[port]}" if port in self else f"is not from 1 to {MAX_PORT}"
                 raise ParameterError(f"port {port} {why}; {advice}")
         self.update(dict.fromkeys(ports, owner))
 

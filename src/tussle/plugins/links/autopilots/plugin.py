@@ -13,7 +13,7 @@ from tussle.api import Autonomy, GroupView, Handle, Output, Param, State
 from tussle.api.channel_map import channel_outputs, write_channels
 from tussle.api.channels import DRIVEN_CHANNELS
 from tussle.plugins.links.autopilots.frames import vehicle_states
-from tussle.plugins.links.autopilots.link import MOST_PORT, AutopilotLink, OwnedPorts, StepClock, await_links
+from tussle.plugins.links.autopilots.link import MAX_PORT, AutopilotLink, OwnedPorts, StepClock, await_links
 
 
 class Autopilot(Autonomy):
@@ -29,7 +29,7 @@ class Autopilot(Autonomy):
     )
     timeout = Param(30.0, structural=True, unit="s", gt=0.0, doc="Longest wait for the autopilot, wall time.")
     world_step = Param(
-        0, structural=True, ge=0, le=MOST_PORT, doc="Ports are higher by this for each world of a stack."
+        0, structural=True, ge=0, le=MAX_PORT, doc="Ports are higher by this for each world of a stack."
     )
     for _channel, _unit in DRIVEN_CHANNELS.items():
         vars()[f"{_channel}_out"] = Output(_channel, unit=_unit, doc="Command.")

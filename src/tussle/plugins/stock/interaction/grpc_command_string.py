@@ -14,9 +14,9 @@ from tussle.declare.messages import Messages, TextMessage
 from tussle.errors import ParameterError, listed, nearest_name
 from tussle.plugins.links.rpc import COMMANDS, SEND_COMMAND, load_grpc, message_types
 
-MOST_WAITING = 10_000
+MAX_WAITING = 10_000
 """Commands that wait for the next step; further ones are refused."""
-MOST_BYTES = 1024 * 1024
+MAX_BYTES = 1024 * 1024
 ONE_ENTITY = re.compile(r"/(\d{1,9})/(.+)", re.DOTALL)
 """Topic of the existing system for one entity: its id and the topic."""
 
@@ -91,7 +91,7 @@ class CommandServer:
             self._take, types["CommandString"].FromString, self._ack.SerializeToString
         )
         # Without the first option, two servers share a port in silence.
-        options = [("grpc.so_reuseport", 0), ("grpc.max_receive_message_length", MOST_BYTES)]
+        options = [("grpc.so_reuseport", 0), ("grpc.max_receive_message_length", MAX_BYTES)]
         self._server = grpc.server(ThreadPoolExecutor(2, "gRPC commands"), options=options)
         self._server.add_generic_rpc_handlers(
             [grpc.method_handlers_generic_handler(service, {method: handler})]
@@ -120,8 +120,8 @@ class CommandServer:
                 self._status.INVALID_ARGUMENT,
                 f"no plugin listens to texts on network {network[:80]!r}, topic {topic[:80]!r}{near}; {listed(names)}",
             )
-        if len(self.waiting) >= MOST_WAITING:
-            call.abort(self._status.RESOURCE_EXHAUSTED, f"{MOST_WAITING} commands wait for the next step")
+        if len(self.waiting) >= MAX_WAITING:
+            call.abort(self._status.RESOURCE_EXHAUSTED, f"{MAX_WAITING} commands wait for the next step")
         self.waiting.append((network, topic, command.value, to))
         return self._ack(success=1)
 

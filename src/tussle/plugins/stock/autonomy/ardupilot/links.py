@@ -13,7 +13,7 @@ from tussle.plugins.links.autopilots.frames import VehicleState
 from tussle.plugins.links.autopilots.link import AutopilotLink, bound
 from tussle.plugins.stock.autonomy.ardupilot import wire
 
-MOST_PACKETS = 1000
+MAX_PACKETS = 1000
 """Packets in one step, refused ones included, beyond which nothing more is read: the buffer of a socket holds some hundreds."""
 LARGEST = 2048
 """More bytes than any packet has."""
@@ -68,9 +68,9 @@ class UdpLink(AutopilotLink):
                 self.fail(f"nothing can be received: {error.strerror}")
                 return
             self._n_packets += 1
-            if self._n_packets > MOST_PACKETS:
+            if self._n_packets > MAX_PACKETS:
                 self.fail(
-                    f"more than {MOST_PACKETS} packets in one step, the last from {_at(place)}{self._remark()}"
+                    f"more than {MAX_PACKETS} packets in one step, the last from {_at(place)}{self._remark()}"
                 )
             elif self._is_stranger(place):
                 self._refused = f"a packet from {_at(place)}"

@@ -18,7 +18,7 @@ TIMING_PERIOD = 1.0
 """Time between the signs of life that a client sends [s]."""
 LONGEST_ATTEMPT = 2.0
 """Longest wait for an answer before another attempt [s]."""
-MOST_PER_SECOND = 2000
+MAX_PER_SECOND = 2000
 """Messages per second, and at once, beyond which a peer is not listened to. A helm sends some tens."""
 CLOSED = "the connection was closed"
 
@@ -69,7 +69,7 @@ class MoosClient:
         self._received = bytearray()
         self._sending = threading.Lock()
         self._is_closing = threading.Event()
-        self._allowance = float(MOST_PER_SECOND)
+        self._allowance = float(MAX_PER_SECOND)
         self._heads: tuple[bytes, bytes] = (b"", b"")
         self._thread = threading.Thread(target=self._run, name=f"MOOS {host}:{port}", daemon=True)
 
@@ -97,7 +97,7 @@ class MoosClient:
     def allow(self, n: int) -> None:
         """Let the peer send this many messages more than it may send in its time."""
         with self.changed:
-            self._allowance = min(self._allowance + n, MOST_PER_SECOND)
+            self._allowance = min(self._allowance + n, MAX_PER_SECOND)
 
     def number(self, tail: bytes) -> bytes:
         """The message that sets a variable to a number; tail: see `wire.encode_tail`."""
@@ -224,12 +224,12 @@ class MoosClient:
     def _deliver(self, elapsed: float) -> None:
         """Pass on the mail of all packets that are complete."""
         with self.changed:
-            self._allowance = min(self._allowance + MOST_PER_SECOND * elapsed, MOST_PER_SECOND)
+            self._allowance = min(self._allowance + MAX_PER_SECOND * elapsed, MAX_PER_SECOND)
             while (messages := wire.take_packet(self._received)) is not None:
                 mail = [message for message in messages if message.kind == wire.NOTIFY]
                 self._allowance -= len(mail)
                 if self._allowance < 0.0:
-                    raise ConnectionError(f"more than {MOST_PER_SECOND} messages per second")
+                    raise ConnectionError(f"more than {MAX_PER_SECOND} messages per second")
                 for message in mail:
                     self._receive(message)
             self.changed.notify_all()

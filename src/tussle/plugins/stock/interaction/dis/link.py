@@ -14,14 +14,14 @@ from tussle.pacing import Pace
 from tussle.plugins.stock.interaction.dis import pdu
 from tussle.world.geodesy import Origin
 
-MOST_DATAGRAMS = 20_000
+MAX_DATAGRAMS = 20_000
 """Read at once; with more, a flood would hold the simulation up."""
 RECEIVE_BUFFER = 4 * 1024 * 1024  # [byte] the system may give less
 BROADCAST = ".255"
-MOST_BYTES = 65536
-MOST_SPEED, MOST_RATE = 1e5, 1e3
+MAX_BYTES = 65536
+MAX_SPEED, MAX_RATE = 1e5, 1e3
 """Largest component of a velocity [m/s] or acceleration [m/s^2], and of an angular velocity [rad/s], that is believed."""
-RATE_FIELDS = {"velocity": MOST_SPEED, "acceleration": MOST_SPEED, "angular_velocity": MOST_RATE}
+RATE_FIELDS = {"velocity": MAX_SPEED, "acceleration": MAX_SPEED, "angular_velocity": MAX_RATE}
 
 
 @dataclass
@@ -107,9 +107,9 @@ class ExerciseLink:
             most: Largest number of remote entities.
         """
         found: list[bytes] = []
-        for _ in range(MOST_DATAGRAMS if self._listens else 0):
+        for _ in range(MAX_DATAGRAMS if self._listens else 0):
             try:
-                datagram = self.socket.recv(MOST_BYTES, socket.MSG_DONTWAIT)
+                datagram = self.socket.recv(MAX_BYTES, socket.MSG_DONTWAIT)
             except BlockingIOError:
                 break
             pdus, n_refused = pdu.split(datagram, exercise)
@@ -193,7 +193,7 @@ def _is_sound(records: np.ndarray, origin: Origin, reach: float) -> np.ndarray:
     """Whether each PDU, (n,), has finite numbers of a possible size and a location within reach [m] of the origin."""
     with np.errstate(invalid="ignore", over="ignore"):
         sound = np.isfinite(records["orientation"]).all(axis=1) & (
-            np.abs(records["orientation"]) < MOST_RATE
+            np.abs(records["orientation"]) < MAX_RATE
         ).all(axis=1)
         for name, most in RATE_FIELDS.items():
             sound &= (np.abs(records[name]) < most).all(axis=1)
