@@ -1,4 +1,4 @@
-"""From an aircraft's files to a kernel."""
+"""Compiles an aircraft's files to kernels."""
 
 from __future__ import annotations
 

@@ -14,8 +14,8 @@ from tussle.errors import ParameterError
 
 MAX_BYTES = 8 << 20
 MAX_NODES = 200_000
-DEEPEST = 60
-MAX_ENTITIES, LONGEST_ENTITY = 100, 100
+MAX_DEPTH = 60
+MAX_ENTITIES, MAX_ENTITY = 100, 100
 
 
 class AircraftError(ParameterError):
@@ -149,9 +149,9 @@ def read_text(data: bytes, name: str) -> Element:
         nonlocal count
         count += 1
         node = Element(tag, f"{name}:{parser.CurrentLineNumber}", attributes)
-        if count > MAX_NODES or len(stack) > DEEPEST:
+        if count > MAX_NODES or len(stack) > MAX_DEPTH:
             raise node.error(
-                f"the file has more than {MAX_NODES} elements, or they nest deeper than {DEEPEST}"
+                f"the file has more than {MAX_NODES} elements, or they nest deeper than {MAX_DEPTH}"
             )
         stack[-1].children.append(node)
         stack.append(node)
@@ -165,7 +165,7 @@ def read_text(data: bytes, name: str) -> Element:
         if (
             value is None
             or is_parameter
-            or len(value) > LONGEST_ENTITY
+            or len(value) > MAX_ENTITY
             or "&" in value
             or entities > MAX_ENTITIES
         ):

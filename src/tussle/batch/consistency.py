@@ -20,7 +20,7 @@ MAX_EMPTY = 200
 quantities. What plugins report may differ between points."""
 MAX_METRICS = 10_000
 MAX_VALUE = 1e100
-"""Of a metric that is finite: sums of squares of larger ones, as variances take them, are not."""
+"""Largest metric that counts as finite: sums of squares of larger ones, as variances take them, are not."""
 ALWAYS_ALLOWED = 1_000_000
 """Largest number of cells of a batch."""
 

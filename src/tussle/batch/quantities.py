@@ -15,7 +15,7 @@ import numpy as np
 
 from tussle.errors import ParameterError, listed, nearest_name
 
-LONGEST_TEXT = 200
+MAX_TEXT = 200
 MAX_LISTED = 12
 SHARES = ("wins", "ties")
 OPERATORS = (ast.Add, ast.Sub, ast.Mult, ast.Div)
@@ -55,9 +55,9 @@ class Quantity:
         Raises:
             ParameterError: The text is no such expression.
         """
-        if len(text) > LONGEST_TEXT:
+        if len(text) > MAX_TEXT:
             raise ParameterError(
-                f"quantity {text[:40]!r}... has {len(text)} characters; at most {LONGEST_TEXT} are allowed"
+                f"quantity {text[:40]!r}... has {len(text)} characters; at most {MAX_TEXT} are allowed"
             )
         try:
             with warnings.catch_warnings():  # the parser has opinions about "1if"; it is refused below

@@ -152,7 +152,7 @@ def _sobol_points(d: int, n: int, seed: int) -> Floats:
 
 
 def _saltelli(variables: Sequence[Variable], n: int, seed: int) -> Rows:
-    """For each of n base points A: A, A with one variable from B for each variable, B.
+    """Saltelli's sample: for each of n base points A, the point A, then A with one variable from B for each variable, then B.
 
     Saltelli et al., Variance based sensitivity analysis of model output, Computer Physics Communications 181 (2010), table 2 (b);
     in the order in which `SALib.analyze.sobol` with calc_second_order=False expects the results.

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from tussle.batch.response import FEWEST_POINTS, Response, fitted
+from tussle.batch.response import MIN_POINTS, Response, fitted
 from tussle.batch.statistics import BOOTSTRAP_FROM, LEVEL, SEED, scipy_package
 from tussle.batch.variables import Variable
 from tussle.errors import MissingExtraError
@@ -202,7 +202,7 @@ def _by_fit(
 ) -> list[Effect]:
     """Return the parts of the variance of the runs by a smooth fit, for points of any sample."""
     y = _means(matrix)
-    n, needed = int(np.isfinite(y).sum()), max(FEWEST_POINTS, 2 * len(variables) + 1)
+    n, needed = int(np.isfinite(y).sum()), max(MIN_POINTS, 2 * len(variables) + 1)
     if n < needed or np.nanmax(y) == np.nanmin(y):
         return _without_parts(
             found, f"they take {needed} points" if n < needed else "the quantity does not vary"

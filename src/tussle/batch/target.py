@@ -116,7 +116,7 @@ class Level:
 
 @dataclass(frozen=True)
 class Crossing:
-    """Where a smooth fit of the quantity first reaches the target: an estimate that leans on all values, and not a proof.
+    """Estimate of where the quantity first reaches the target, from a smooth fit to all values; it proves nothing.
 
     Attributes:
         value: Of the variable, by the fit; NaN where it stays below.
@@ -139,7 +139,7 @@ class Crossing:
 
 
 def crossing_of(response: Response, target: Target, over: str, choice: Mapping[str, Any]) -> Crossing | None:
-    """Where a fit reaches a target first; None where it nowhere does.
+    """Return where a fit first reaches a target; None if it does not.
 
     Args:
         response: The fit.

@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     from tussle.record import Recorder
 
 SEARCHED = 10_000
-"""Bytes at the beginning of a file in which its root tag is searched."""
+"""Number of bytes at the beginning of a file in which the root tag is searched."""
 STATES = {"plays": "can be played", "waits": "wait for a program or a device", "refused": "are refused"}
 
 

@@ -267,7 +267,7 @@ class PluginReader:
                 repaired = " ".join(codecs.inline_text(*plugin) for plugin in found)
             except TussleError:
                 raise error from None
-            self.problems.mended(place, str(error), repaired)
+            self.problems.note_repair(place, str(error), repaired)
             return found
 
     def _not_a_parameter(self, written: PluginTag, cls: type[Plugin], attribute: str) -> None:

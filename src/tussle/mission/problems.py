@@ -6,13 +6,13 @@ from collections.abc import Collection, Iterable
 from itertools import islice
 from typing import NamedTuple
 
-from tussle.declare.texts import LONGEST_SHOWN, shown
+from tussle.declare.texts import MAX_SHOWN, shown
 from tussle.errors import MissionError, listed, nearest_name
 
 MAX_LINES = 100
 """Maximum number of errors, and of notes; a file with more is most likely not a mission."""
 
-LONGEST_REPAIRED = 200
+MAX_REPAIRED = 200
 """Characters of a repaired line in a message."""
 MAX_GUESSED = 1000
 """Maximum number of names that are searched for the nearest one."""
@@ -55,7 +55,7 @@ class Problems:
         self._absent: dict[tuple[str, str], str] = {}
         self._unknown: dict[tuple[str, str], tuple[str, str]] = {}
         self._has_unknown = False
-        self._mended: dict[str, tuple[str, list[Place]]] = {}
+        self._repairs: dict[str, tuple[str, list[Place]]] = {}
 
     def error(self, place: Place, text: str) -> None:
         """Add an error: the mission cannot be run.
@@ -73,7 +73,7 @@ class Problems:
         if (what, name) not in self._absent:
             some = list(islice(known, MAX_GUESSED))
             more = ", ..." if len(known) > len(some) else ""
-            guess = nearest_name(name[:LONGEST_SHOWN], some)
+            guess = nearest_name(name[:MAX_SHOWN], some)
             self._absent[what, name] = f"there is no {what} {shown(name)}{guess}; {listed(some)}{more}"
         self.error(place, self._absent[what, name])
 
@@ -93,7 +93,7 @@ class Problems:
             return
         if (what, name) not in self._unknown:
             known = sorted(allowed)
-            text = f"{what} {shown(name)} is unknown{nearest_name(name[:LONGEST_SHOWN], known)}"
+            text = f"{what} {shown(name)} is unknown{nearest_name(name[:MAX_SHOWN], known)}"
             self._unknown[what, name] = text, listed(known)
         text, allowed_names = self._unknown[what, name]
         if self.strictness.is_strict or not place.line:
@@ -103,7 +103,7 @@ class Problems:
             self._has_unknown = True
             self.note(place, f"{text}; it is ignored")
 
-    def mended(self, place: Place, what: str, repaired: str) -> None:
+    def note_repair(self, place: Place, what: str, repaired: str) -> None:
         """Add what is wrong but has a meaning in SCRIMMAGE: an error, or a note if the reading is lenient and the file has it.
 
         Args:
@@ -114,12 +114,12 @@ class Problems:
         if not place.line:
             self.error(place, what)
             return
-        self._mended.setdefault(what, (repaired, []))[1].append(place)
+        self._repairs.setdefault(what, (repaired, []))[1].append(place)
 
     def _mends(self, text: str) -> dict[str, list[Place]]:
         return {
-            f"{what}; {text} {shown(repaired, LONGEST_REPAIRED)}": places
-            for what, (repaired, places) in islice(self._mended.items(), MAX_LINES)
+            f"{what}; {text} {shown(repaired, MAX_REPAIRED)}": places
+            for what, (repaired, places) in islice(self._repairs.items(), MAX_LINES)
         }
 
     @property
@@ -145,7 +145,7 @@ class Problems:
         if not errors:
             return
         why = [self.strictness.reason] if self._has_unknown and is_strict else []
-        if self._mended and is_strict and self.strictness.reason:
+        if self._repairs and is_strict and self.strictness.reason:
             why.append("--lenient (strict=False) reads what is malformed as SCRIMMAGE does, with a note")
         raise MissionError("\n".join([*_lines(errors), *filter(None, why)]))
 

@@ -30,7 +30,7 @@ KEY = "checksum"
 """Name of the metadata entry that holds the checksum of a block."""
 CHUNK = 1 << 20
 MAX_SEARCHED = 128_000_000
-"""Bytes behind a damaged block that are searched for the next intact one, far more than a block has: a file may seem enormous."""
+"""Number of bytes behind a damaged block in which the next intact one is searched, far more than a block has: a file may seem enormous."""
 MAX_SEARCH = 8
 """Bytes that the search for intact blocks behind damaged ones may read, per byte of the file: a file can be made to be slow to search."""
 _START = re.compile(rb"\xff{4}(?=[\s\S]{3}\x00)")

@@ -110,7 +110,7 @@ class Convex(Volume):
         return way
 
     def outward(self, pos: np.ndarray) -> np.ndarray:
-        """Of the face whose plane is nearest."""
+        """Outward normals of the faces whose planes are nearest."""
         east, north, up, offset = self._face_columns[:, :, None]
         face = (east * pos[0] + north * pos[1] + up * pos[2] - offset).argmax(axis=0)
         return np.asarray(self._face_columns[:3, face])

@@ -113,7 +113,7 @@ class ReportData:
 
     @property
     def has_points(self) -> bool:
-        """There is more than one point."""
+        """True if the batch has more than one point."""
         return len(self.points) > 1
 
     @cached_property

@@ -335,8 +335,8 @@ def ended(data: ReportData) -> Section:
     )
 
 
-def look_at(data: ReportData) -> Section:
-    """Games that failed, and those that took longest, with the commands that play them again."""
+def notable_runs(data: ReportData) -> Section:
+    """Section with failed games and those that took longest, and the commands that play them again."""
     results = data.results
     is_file = (results.info.get("mission") or {}).get("made_in") != "python"
     folder = results.path.resolve().name if results.path is not None and is_file else None

@@ -33,7 +33,7 @@ from tussle.errors import ParameterError
 from tussle.palette import TEAM_COLOURS
 
 MAX_BARS = 40
-"""Up to so many points have their intervals as bars, if nothing else varies behind them."""
+"""Largest number of points whose intervals are drawn as bars."""
 MAX_PLACES = 20
 """Largest number of choices in a plot, and of points in a table."""
 MAX_PANELS = 3

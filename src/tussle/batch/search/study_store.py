@@ -69,7 +69,7 @@ COMPARED = (
 PROPOSED_BY = ("optuna", "cmaes", "numpy", "scipy")
 """Packages on whose versions the proposals depend."""
 MAX_JOURNAL = 1 << 28
-"""Of a journal [B]."""
+"""Largest size of a journal [B]."""
 
 
 class StudyStore:

@@ -16,9 +16,9 @@ TOKEN_BYTES = 16
 MAX_BROWSERS = 32
 """Largest number of connected browsers."""
 MAX_BYTES = 16 * 1024
-"""Of one message from a browser; the longest that a control sends has some hundred."""
+"""Largest size of a message from a browser [B]; controls send some hundred."""
 MAX_UNSENT = 64 * 1024
-"""Bytes that a browser has not taken yet when sending to it pauses."""
+"""Number of unsent bytes at which sending to a browser pauses."""
 PORT = 8123
 """Default port; if it is taken, the next free one is used."""
 MAX_PORTS = 100
@@ -28,7 +28,7 @@ HEADERS = {
     "X-Content-Type-Options": "nosniff",
     "Cache-Control": "no-store",
 }
-"""Of each answer: nobody else learns the address, and no other page shows this one inside itself."""
+"""Headers of each answer: browsers pass the address to nobody, and no other page embeds this one."""
 
 
 class Access:

@@ -327,5 +327,5 @@ def _place_beside(a: Recording, b: Recording) -> np.ndarray:
 
 
 def _largest_id(run: Recording) -> int:
-    """Of all who were ever there: those at the beginning, and those whose birth is an event."""
+    """Largest id of all entities of a run: of the first frame, and of births among the events."""
     return max(int(run.frame(0).id.max(initial=0)), max((h.id for h in run.events), default=0))

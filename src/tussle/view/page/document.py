@@ -259,5 +259,5 @@ def terrain_note(scenery: Scenery) -> str:
 
 
 def _size(terrain: Terrain) -> str:
-    """Such as "300 x 200"."""
+    """Write a size: "300 x 200"."""
     return f"{len(terrain.x)} x {len(terrain.y)}"

@@ -11,8 +11,8 @@ from tussle.record.event_texts import end_text
 
 MAX_BLOCKS = 20
 """Blocks that are listed."""
-MAX_LETTERS = 400
-"""Of the plugins of a block."""
+MAX_LENGTH = 400
+"""Largest number of characters in the list of a block's plugins."""
 Fact = tuple[str, str]
 
 
@@ -39,7 +39,7 @@ def mission_facts(mission: Mapping[str, Any], teams: Mapping[int, str]) -> list[
 
 
 def _plugins(texts: Iterable[str]) -> str:
-    return shortened(", ".join(text.partition("(")[0] for text in texts), MAX_LETTERS)
+    return shortened(", ".join(text.partition("(")[0] for text in texts), MAX_LENGTH)
 
 
 def _end(mission: Mapping[str, Any]) -> str:

@@ -13,8 +13,8 @@ from tussle.engine.result import WorldResult
 from tussle.view.entity import EntityState, Reading, ShownMessage
 
 MAX_ITEMS = 6
-"""Of a list, in a reading or a message."""
-MAX_LETTERS = 8
+"""Largest number of items of a list that are shown."""
+MAX_MESSAGES = 8
 NARROW = "\N{NO-BREAK SPACE}"
 """Keeps a number with its name and its unit on one line."""
 MINUS = "\N{MINUS SIGN}"
@@ -65,11 +65,11 @@ def entity_sections(state: EntityState) -> list[tuple[str, list[Row]]]:
     """Return titles and rows of an entity: body, columns of plugins, what they do before their parameters, and messages."""
     body = [(key, reading(r)) for key, r in state.body.items() if key not in ("force", "torque")]
     plugins = [(name, _column_rows(columns)) for name, columns in state.plugins.items()]
-    letters = [
-        (title, [_letter(letter) for letter in said[-MAX_LETTERS:]])
-        for title, said in (("heard", state.heard), ("said", state.said))
+    messages = [
+        (title, [_message_row(message) for message in found[-MAX_MESSAGES:]])
+        for title, found in (("received", state.received), ("sent", state.sent))
     ]
-    return [("", body), *(section for section in (*plugins, *letters) if section[1])]
+    return [("", body), *(section for section in (*plugins, *messages) if section[1])]
 
 
 def _column_rows(columns: Mapping[str, Reading]) -> list[Row]:
@@ -121,6 +121,6 @@ def _component_names(fields: Sequence[str]) -> list[str]:
     return [tail if is_common else name for name, (_, _, tail) in zip(fields, parts, strict=True)]
 
 
-def _letter(letter: ShownMessage) -> Row:
-    fields = "; ".join(f"{name} {number(value)}" for name, value in letter.fields.items())
-    return letter.topic, f"{letter.sender or 'world'}: {fields}"
+def _message_row(message: ShownMessage) -> Row:
+    fields = "; ".join(f"{name} {number(value)}" for name, value in message.fields.items())
+    return message.topic, f"{message.sender or 'world'}: {fields}"

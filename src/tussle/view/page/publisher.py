@@ -19,7 +19,7 @@ from tussle.view.curves import numbers_of
 from tussle.view.frame import Event, Frame
 from tussle.view.live import Live
 from tussle.view.page.chunks import FULL_HEALTH, UNIT, pack, step_of
-from tussle.view.page.commands import LARGEST_ID, WANTED, Command, game_commands, number, read_command, whole
+from tussle.view.page.commands import MAX_ID, WANTED, Command, game_commands, number, read_command, whole
 from tussle.view.page.document import event_rows
 from tussle.view.page.drawing import drawing_message
 from tussle.view.page.facts import mission_facts
@@ -34,17 +34,17 @@ if TYPE_CHECKING:
 PERIOD = 1.0 / 30.0
 """Least time between two frames [s]."""
 STATUS_PERIOD = 0.25
-"""Time between two readings of what nobody reads faster: numbers, notes, events, the chosen entity [s]."""
+"""Period at which numbers, notes, events and the chosen entity are sent [s]."""
 MAX_MESSAGES = 200
-"""From one browser in a second, and at once. More wait."""
+"""Largest number of messages per second that are read from one browser; further ones wait."""
 MAX_EVENTS = 2000
-"""Of one message."""
+"""Largest number of events in one message."""
 MAX_CHANGES = 5000
-"""Of one message; those of one quantity are sent together, at most as many as are kept."""
+"""Number of changes at which a message is full; those of one quantity are sent together."""
 REFUSAL_PERIOD = 1.0
 """Least time between two messages about refused values [s]."""
 PAST_FRAMES, PAST_STATES = 120, 60_000
-"""Of a look back, at most."""
+"""Limits of the history that a browser asks for: frames, and states of entities in them."""
 MAX_LOOKS = 4
 """Back, that wait to be sent to a browser."""
 
@@ -115,7 +115,7 @@ class FramePublisher:
         return {
             "source": "socket", "facts": facts, "endTime": mission.end if self._ends_by_time else None, "dt": mission.dt,
             "idShift": 0, "isComplete": True, "attitudeUnit": UNIT,
-            "healthSteps": FULL_HEALTH, "seed": min(self._live.seed, LARGEST_ID),
+            "healthSteps": FULL_HEALTH, "seed": min(self._live.seed, MAX_ID),
         }  # fmt: skip
 
     @property
@@ -287,7 +287,7 @@ class FramePublisher:
     def _take(self, reader: Reader, text: Any) -> None:
         """Execute the command of a browser; ignore invalid ones."""
         commands = self._commands | {
-            "choose": Command(reader.choose, {"id": whole(0, LARGEST_ID)}, steers=False),
+            "choose": Command(reader.choose, {"id": whole(0, MAX_ID)}, steers=False),
             "want": Command(lambda wanted: self._want(reader, wanted), {"wanted": WANTED}, steers=False),
             "history": Command(
                 lambda seconds: self._look_back(reader, seconds), {"seconds": number(0.0, 1e9)}, steers=False

@@ -26,7 +26,7 @@ from tussle.view.recording import Recording
 FILE_STATES, FILE_FRAMES = 150_000, 32
 """States of a chunk in a file, about, and its least frames: with fewer the first states of its tracks weigh too much."""
 SERVED_STATES, SERVED_FRAMES = 20_000, 4
-"""Of a chunk that is served: some hundredths of a second of work for both ends, so that a jump in time is not felt."""
+"""Largest numbers of states and frames in a chunk: work of some hundredths of a second for both ends, so that seeking is not felt."""
 MAX_FRAMES = 1024
 """Frames of a chunk: with more a page has to read too much before it shows anything."""
 SHAPE_FRAMES = 64

@@ -26,13 +26,13 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 
 MAX_BYTES = 64 * 1024 * 1024
-"""Of one message from a client."""
+"""Largest size of a message from a client [B]."""
 MAX_WAITING = 64
-"""Messages that wait until a client takes them; further states are dropped."""
+"""Length of a client's queue of messages; further states are dropped."""
 MAX_SUBSCRIPTIONS = 64
-"""Of one client."""
+"""Largest number of subscriptions of a client."""
 SLICE = 0.05
-"""Time for which steps are made before other commands are executed [s]."""
+"""Longest run of steps before other commands are executed [s]."""
 OWN_COMMANDS = ("pause", "play", "step", "subscribe", "unsubscribe")
 
 

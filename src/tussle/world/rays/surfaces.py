@@ -143,7 +143,7 @@ class HeightField:
 
     @property
     def grid(self) -> np.ndarray:
-        """For kernels: west, south, width and depth of a cell, least and greatest height [m], (6,)."""
+        """Numbers of the grid for kernels: west, south, width and depth of a cell, least and greatest height [m], (6,)."""
         return np.array([self.west, self.south, self.cell, self.cell, self.height.min(), self.height.max()])
 
     def triangles(self) -> np.ndarray:

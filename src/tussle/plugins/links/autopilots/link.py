@@ -15,7 +15,7 @@ from tussle.plugins.links.autopilots.frames import VehicleState
 
 TICK_PERIOD = 0.01
 """Longest wait before a state is sent again [s]."""
-LONGEST_STEP = 1.0
+MAX_STEP_TIME = 1.0
 """Wall time of a step beyond which the simulation is paused, or waits for another autopilot [s]."""
 MAX_PORT = 65535
 
@@ -63,7 +63,7 @@ class AutopilotLink(ABC):
     def leave(self) -> None:
         """End a step. Without lockstep, an autopilot that has been silent for too long has failed; a pause is not silence."""
         now = time.monotonic()
-        self._silence += min(now - self._left, LONGEST_STEP)
+        self._silence += min(now - self._left, MAX_STEP_TIME)
         self._left = now
         if self._silence > self.timeout and not self.lockstep:
             self.fail(f"silent for {self.timeout:g} s")

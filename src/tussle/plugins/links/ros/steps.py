@@ -187,7 +187,7 @@ class NodeLink(ABC):
         return self.time_of(*divmod(max(nanoseconds, 0), NANO))
 
     def begin_step(self, g: Any) -> None:
-        """At the first call in a step: publish the states of all robots, then wait while paused."""
+        """Publish the states of all robots, then wait while paused; only the first call in a step does so."""
         step = int(g.step_count[0])
         if step != self._step:
             self._step = step

@@ -73,17 +73,17 @@ class CommandServer:
 
     Args:
         address: Host and port.
-        heard: Network and name of each topic that plugins listen to.
+        subscribed: Network and name of each topic that plugins listen to.
 
     Attributes:
         last_id: Largest id of an entity that has been born.
         waiting: Network, topic, text, and id of the entity that it is for or 0, of commands that are not yet published.
     """
 
-    def __init__(self, address: str, heard: list[tuple[str, str]]) -> None:
+    def __init__(self, address: str, subscribed: list[tuple[str, str]]) -> None:
         grpc = load_grpc("GRPCCommandString")
         self.waiting: deque[tuple[str, str, str, int]] = deque()
-        self._heard, self._status, self.last_id = heard, grpc.StatusCode, 0
+        self._subscribed, self._status, self.last_id = subscribed, grpc.StatusCode, 0
         types = message_types("scrimmage_msgs", **COMMANDS)
         self._ack = types["CommandAck"]
         _, service, method = SEND_COMMAND.split("/")
@@ -113,8 +113,8 @@ class CommandServer:
                     self._status.INVALID_ARGUMENT,
                     f"topic {command.topic[:80]!r}: no entity has had the id {to}; ids are 1 to {self.last_id}",
                 )
-        if (network, topic) not in self._heard:
-            names = [" ".join(each) for each in self._heard]
+        if (network, topic) not in self._subscribed:
+            names = [" ".join(each) for each in self._subscribed]
             near = nearest_name(f"{network} {topic}", names)
             call.abort(
                 self._status.INVALID_ARGUMENT,

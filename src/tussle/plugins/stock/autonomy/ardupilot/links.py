@@ -15,8 +15,8 @@ from tussle.plugins.stock.autonomy.ardupilot import wire
 
 MAX_PACKETS = 1000
 """Packets in one step, refused ones included, beyond which nothing more is read: the buffer of a socket holds some hundreds."""
-LARGEST = 2048
-"""More bytes than any packet has."""
+MAX_PACKET = 2048
+"""Size of the receive buffer [B], larger than any packet."""
 UNHEARD_PERIOD = 0.1
 """Time after which a state that nobody listened to is sent again [s]."""
 
@@ -61,7 +61,7 @@ class UdpLink(AutopilotLink):
         """Read all packets."""
         while not self.failure:
             try:
-                data, place = self._in.recvfrom(LARGEST)
+                data, place = self._in.recvfrom(MAX_PACKET)
             except BlockingIOError:
                 return
             except OSError as error:

@@ -15,7 +15,7 @@ from tussle.plugins.stock.autonomy.moos.mission_file import MoosCommunity
 DESIRED = ("DESIRED_HEADING", "DESIRED_SPEED", "DESIRED_DEPTH")
 STATE, STEP, DONE = "IVPHELM_STATE", "TUSSLE_STEP", "TUSSLE_STEP_DONE"
 DEPLOYMENT = {"DEPLOY": "true", "RETURN": "false", "MOOS_MANUAL_OVERRIDE": "false"}
-"""What a helm is told when it is heard for the first time."""
+"""Variables that are sent to a helm after its first message."""
 MALCONFIG = "MALCONFIG"
 """State of a helm that does not understand its configuration; it never steers."""
 PER_STEP = 32
@@ -53,7 +53,7 @@ class Vessel:
         self._sent: list[bytes] = []
         self._has_begun, self._n_lost = False, 0
         self._state = ""
-        self._heard = time.monotonic()
+        self._last_message = time.monotonic()
         self._step = -1.0
         self._wanted: dict[str, float] = {}
         self._answer: dict[str, float] | None = None
@@ -86,7 +86,7 @@ class Vessel:
         left = self._pace.due_in(t, dt)
         with self.client.changed:
             self.client.changed.wait_for(lambda: bool(self.failure), max(left, 0.0))
-        if self._state and time.monotonic() - self._heard > self.timeout:
+        if self._state and time.monotonic() - self._last_message > self.timeout:
             self.client.fail(f"the helm has been silent for {self.timeout:g} s{self._state_text()}")
 
     def await_answer(self, limit: float) -> None:
@@ -161,16 +161,20 @@ class Vessel:
             if isinstance(value, str) or not math.isfinite(value):
                 raise ConnectionError(f"{message.source} says {key} = {value!r}; it takes a finite number")
             if key in DESIRED:
-                self._follow(message.source, key)
+                self._accept_helm(message.source, key)
                 self._wanted[key] = value
             elif value == self._step and self._answer is None:
                 self._answer = dict(self._wanted)
                 self.client.allow(PER_STEP)
         if self._state != MALCONFIG:
-            self._heard = time.monotonic()
+            self._last_message = time.monotonic()
 
-    def _follow(self, source: str, key: str) -> None:
-        """One helm may take over from another one, but two do not steer together."""
+    def _accept_helm(self, source: str, key: str) -> None:
+        """Accept a command of a helm: a new helm may take over, but two may not alternate.
+
+        Raises:
+            ConnectionError: A former helm sets a variable again.
+        """
         if source != self._source:
             if source in self._former:
                 raise ConnectionError(f"{source} and {self._source} both set {key}")

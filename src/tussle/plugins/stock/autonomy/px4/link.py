@@ -16,9 +16,9 @@ from tussle.plugins.links.autopilots.link import AutopilotLink, bound
 from tussle.plugins.stock.autonomy.px4.sensors import SensorSuite
 
 MAX_BYTES = 1 << 20
-"""Bytes in one step beyond which nothing more is read, and unsent bytes beyond which the autopilot counts as stuck."""
+"""Largest number of bytes read in one step, and of unsent bytes before the autopilot counts as stuck."""
 SEND_BUFFER = 1 << 16
-"""Bytes that the system keeps for an autopilot that does not read."""
+"""Size of the system's send buffer [B]."""
 FREEWHEEL_STEP = 4000
 """PX4's time between two messages while it starts [us]: its usual 250 Hz."""
 LOCKSTEP_FLAG = 1
