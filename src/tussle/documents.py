@@ -11,11 +11,10 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from tussle.checksums import BLANK, MARK, is_intact, sealed
-from tussle.errors import ParameterError, TussleError, listed, nearest_name
+from tussle.errors import ParameterError, TussleError, clipped, listed, nearest_name
 
 MAX_BYTES = 1 << 25
 """Maximum size of a document. Parsed JSON takes up to about twenty times as much memory."""
-MAX_SHOWN = 80
 CHECKSUM = "checksum"
 """Field of a document that holds its checksum."""
 DAMAGED = f"is damaged: its checksum does not match its content; if it was edited, remove the line {CHECKSUM!r} to read it as it is"
@@ -187,7 +186,7 @@ def _scalar_problem(value: Any, rule: Rule, where: str) -> str:
     """Describe what is wrong with a value that is not a container."""
     if isinstance(rule, tuple):
         is_there = any(type(value) is type(one) and value == one for one in rule)
-        guess = nearest_name(value[:MAX_SHOWN], rule) if isinstance(value, str) else ""
+        guess = nearest_name(value, rule) if isinstance(value, str) else ""
         return (
             "" if is_there else f"{where} = {_shown(value)} is not allowed{guess}; {listed(map(repr, rule))}"
         )
@@ -224,7 +223,7 @@ def _shown(value: Any) -> str:
         if not isinstance(value, int) or abs(value) < 10**80
         else "a number of more than 80 digits"
     )
-    return text if len(text) <= MAX_SHOWN else text[:MAX_SHOWN] + "..."
+    return clipped(text)
 
 
 def _first(problems: Iterable[str]) -> str:

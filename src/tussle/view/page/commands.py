@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from tussle.errors import ParameterError
+from tussle.errors import ParameterError, clipped
 from tussle.view.live import Live
 
 MAX_COORDINATE = 1e12
@@ -20,8 +20,6 @@ MAX_WANTED = 64
 """Quantities of the curves that one browser can choose."""
 CUSTOM_KEY = ";"
 """The key that is kept for the plugins, as in SCRIMMAGE."""
-SHOWN = 40
-"""Characters of a refused value in the words about it."""
 
 
 @dataclass(frozen=True)
@@ -139,7 +137,7 @@ def read_command(text: Any, commands: Mapping[str, Command]) -> tuple[str, dict[
         return None
     for key, check in command.fields.items():
         if not check.holds(given[key]):
-            shown = repr(given[key])
-            shown = shown if len(shown) <= SHOWN else f"{shown[:SHOWN]} …"
-            raise ParameterError(f"{key} = {shown} is not allowed; it takes {check.allowed}")
+            raise ParameterError(
+                f"{key} = {clipped(repr(given[key]))} is not allowed; it takes {check.allowed}"
+            )
     return name, given
