@@ -177,6 +177,14 @@ class Task:
         return self._of("action", block, Act)
 
     @cached_property
+    def columns(self) -> dict[str, list[tuple[Component, int]]]:
+        """Components of each block's observation, each with its first column."""
+        return {
+            name: list(zip(self.components(name), np.cumsum([0, *widths]).tolist(), strict=False))
+            for name, widths in self.widths.items()
+        }
+
+    @cached_property
     def widths(self) -> dict[str, list[int]]:
         """Numbers of each component, by block."""
         return {b.name: [c.width(self.played, b.name) for c in self.components(b.name)] for b in self.blocks}
