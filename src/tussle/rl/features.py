@@ -58,6 +58,11 @@ def bounds_of(spans: Sequence[tuple[float, float]]) -> np.ndarray:
 def check_features(
     where: str, frame: str, names: Sequence[str], allowed: Sequence[str], scale: Scale
 ) -> None:
+    """Check a declaration.
+
+    Raises:
+        ParameterError: A name or value is not allowed.
+    """
     if frame not in FRAMES:
         raise ParameterError(f"{where}: frame = {frame!r} is not allowed; {listed(FRAMES)}")
     for name in names:

@@ -104,6 +104,8 @@ class Task:
         for name, term in self.reward.items():
             if not isinstance(term, Term):
                 raise ParameterError(f"{where}: reward {name!r} is {term!r}, not a Term")
+            if name.startswith("_"):  # "_NAME" is the mask of NAME in the infos of vector environments
+                raise ParameterError(f"{where}: reward {name!r}: the name of a term does not begin with _")
         _ = self.widths
 
     # -- what follows ------------------------------------------------------------------------------------------------------

@@ -96,8 +96,8 @@ def test_the_last_step_of_an_episode_has_its_info(name):
     assert info["seed"].tolist() != [5, 6]
     assert info["_final_info"].all()
     for term, value in envs.swarm.terms.items():
-        np.testing.assert_array_equal(last[term], value.sum(axis=1))
-        assert last[f"_{term}"].all()
+        np.testing.assert_array_equal(last["terms"][term], value.sum(axis=1))
+        assert last["terms"][f"_{term}"].all()
 
 
 class Watched(Flee):
