@@ -16,7 +16,7 @@ from tussle.batch.trust import DirectoryCode
 from tussle.errors import BatchError
 from tussle.mission import Loaded, Mission, PluginFile, read_mission
 from tussle.record.input_table import load_inputs
-from tussle.record.inputs import Input
+from tussle.record.inputs import ExternalInput
 from tussle.record.plugin_copies import copied_plugins
 from tussle.record.schema import MISSION_FILE, RUN, RUN_FILE
 
@@ -51,7 +51,7 @@ class PlannedRun:
     seed: int
     state_hash: str
     origin: str = "batch"
-    inputs: tuple[Input, ...] = ()
+    inputs: tuple[ExternalInput, ...] = ()
 
 
 def recorded_run(

@@ -44,7 +44,7 @@ class Listeners:
         is_replaying: True while steps are repeated that have been reported already; listeners are not called.
         on_change: Called when a listener is added or removed.
         traffic: Objects that count messages.
-        inputs: Functions called with the world and each `Input` from outside.
+        inputs: Functions called with the world and each `ExternalInput` from outside.
     """
 
     def __init__(self, context: Context) -> None:

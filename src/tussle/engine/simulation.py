@@ -30,7 +30,7 @@ from tussle.engine.step_end import remove_dead, world_result
 from tussle.errors import MissionError, ParameterError, PluginError
 from tussle.mission import GivenMission, Mission, mission_of
 from tussle.mission.spec import SHUFFLED
-from tussle.record.inputs import COLUMN, Input, fields_of, of_message
+from tussle.record.inputs import COLUMN, ExternalInput, fields_of, of_message
 
 if TYPE_CHECKING:
     from tussle.record import FirstStates
@@ -83,7 +83,7 @@ class Simulation:
         self._check(mission, numbers, on_error)
         self.mission, self.n_worlds = mission, len(numbers)
         self.observers: list[Callable[[Simulation], None]] = []
-        self._inputs: dict[int, dict[int, list[Input]]] = {}
+        self._inputs: dict[int, dict[int, list[ExternalInput]]] = {}
         self.is_closed = False
         self._resumed = threading.Event()
         self._resumed.set()
@@ -256,7 +256,7 @@ class Simulation:
         """Set a column by path, with values shaped as from `read`. Rows of dead entities are ignored. A reset discards parameter values."""
         written = access.write(self.state, path, values)
         for world in self._told_worlds():
-            self._tell(world, Input(self._step_of(world), COLUMN, path, written[world].tolist()))
+            self._tell(world, ExternalInput(self._step_of(world), COLUMN, path, written[world].tolist()))
 
     def publish(
         self,
@@ -305,11 +305,11 @@ class Simulation:
     def _step_of(self, world: int) -> int:
         return int(self.state.context.clock.step[world])
 
-    def _tell(self, world: int, given: Input) -> None:
+    def _tell(self, world: int, given: ExternalInput) -> None:
         for listener in self.events.inputs:
             listener(world, given)
 
-    def play_inputs(self, inputs: Iterable[Input], world: int = 0) -> None:
+    def play_inputs(self, inputs: Iterable[ExternalInput], world: int = 0) -> None:
         """Let what came from outside in another game come into a world again, each before its step, also after a reset or `restore`.
 
         `tussle.record.load_inputs` reads them from a run directory. A second call replaces those of the first.
@@ -321,7 +321,7 @@ class Simulation:
             raise ParameterError(
                 f"play_inputs: world = {world!r} is not allowed; there are worlds 0 to {self.n_worlds - 1}"
             )
-        by_step: dict[int, list[Input]] = {}
+        by_step: dict[int, list[ExternalInput]] = {}
         for each in inputs:
             if each.values is None:
                 raise ParameterError(
@@ -331,7 +331,7 @@ class Simulation:
             by_step.setdefault(each.step, []).append(each)
         self._inputs[world] = by_step
 
-    def play_input(self, given: Input, world: int = 0) -> None:
+    def play_input(self, given: ExternalInput, world: int = 0) -> None:
         """Repeat one input now.
 
         Raises:

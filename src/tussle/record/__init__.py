@@ -12,14 +12,14 @@ from tussle.record.state_hash import hash_columns
 if TYPE_CHECKING:
     from tussle.record.first_states import FirstStates, read_table
     from tussle.record.input_table import load_inputs
-    from tussle.record.inputs import Input
+    from tussle.record.inputs import ExternalInput
     from tussle.record.recorder import Recorder
     from tussle.record.run import Run, load_run
 
 __all__ = [
     "Events",
+    "ExternalInput",
     "FirstStates",
-    "Input",
     "Recorder",
     "Run",
     "hash_columns",
@@ -30,7 +30,7 @@ __all__ = [
 
 _LAZY = {
     "FirstStates": "first_states",
-    "Input": "inputs",
+    "ExternalInput": "inputs",
     "Recorder": "recorder",
     "Run": "run",
     "load_inputs": "input_table",

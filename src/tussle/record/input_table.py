@@ -10,7 +10,7 @@ from typing import Any
 import pyarrow as pa
 
 from tussle.errors import RecordError
-from tussle.record.inputs import MESSAGE, Input
+from tussle.record.inputs import MESSAGE, ExternalInput
 from tussle.record.run import load_run
 from tussle.record.schema import INPUTS, INPUTS_FILE
 
@@ -18,7 +18,7 @@ MAX_SHOWN = 60
 """Characters of a damaged value in the words about it."""
 
 
-def load_inputs(path: str | Path, world: int = 0) -> tuple[Input, ...]:
+def load_inputs(path: str | Path, world: int = 0) -> tuple[ExternalInput, ...]:
     """What came from outside into one world of a recorded run, in its order: messages, and columns that were set.
 
     Args:
@@ -35,7 +35,7 @@ def load_inputs(path: str | Path, world: int = 0) -> tuple[Input, ...]:
     return inputs_of(run.inputs_table, world)
 
 
-def batch_of(inputs: Iterable[tuple[int, Input]], time_of: Callable[[int], float]) -> pa.RecordBatch:
+def batch_of(inputs: Iterable[tuple[int, ExternalInput]], time_of: Callable[[int], float]) -> pa.RecordBatch:
     """Rows of `inputs.arrow`.
 
     Args:
@@ -56,14 +56,14 @@ def batch_of(inputs: Iterable[tuple[int, Input]], time_of: Callable[[int], float
     return pa.RecordBatch.from_arrays(arrays, schema=INPUTS)
 
 
-def inputs_of(table: pa.Table, world: int) -> tuple[Input, ...]:
+def inputs_of(table: pa.Table, world: int) -> tuple[ExternalInput, ...]:
     """What came from outside into one world of a recorded run, in its order.
 
     Raises:
         RecordError: A value is no JSON.
     """
     return tuple(
-        Input(row["step"], row["kind"], row["name"], _read(row), row["network"], row["topic"])
+        ExternalInput(row["step"], row["kind"], row["name"], _read(row), row["network"], row["topic"])
         for row in table.to_pylist()
         if row["world"] == world
     )

@@ -17,7 +17,7 @@ MESSAGE, COLUMN = "message", "column"
 
 
 @dataclass(frozen=True)
-class Input:
+class ExternalInput:
     """What came from outside before a step of a world.
 
     Attributes:
@@ -38,11 +38,11 @@ class Input:
     topic: str = ""
 
 
-InputListener = Callable[[int, Input], None]
+InputListener = Callable[[int, ExternalInput], None]
 """Called with the world and what has come from outside."""
 
 
-def of_message(sent: Messages, place: int, step: int, network: str, topic: str) -> Input:
+def of_message(sent: Messages, place: int, step: int, network: str, topic: str) -> ExternalInput:
     """The input that is a message of a batch.
 
     Args:
@@ -57,7 +57,7 @@ def of_message(sent: Messages, place: int, step: int, network: str, topic: str) 
         json.dumps(values)
     except TypeError:
         values = None
-    return Input(step, MESSAGE, sent.type.__name__, values, network, topic)
+    return ExternalInput(step, MESSAGE, sent.type.__name__, values, network, topic)
 
 
 def _plain(values: Any, place: int) -> Any:

@@ -18,7 +18,7 @@ from tussle.mission import PluginFile, to_xml
 from tussle.record import run_file
 from tussle.record.events import BIRTH, END, Events
 from tussle.record.input_table import batch_of
-from tussle.record.inputs import Input
+from tussle.record.inputs import ExternalInput
 from tussle.record.plugin_columns import ColumnReader, select
 from tussle.record.plugin_copies import plugin_copies
 from tussle.record.results import ResultRows
@@ -129,7 +129,7 @@ class Recorder:
         recorded = [source.column for source in self._columns.sources]
         self._buffer = RowBuffer([b.name for b in mission.blocks], clock.start, clock.dt, recorded)
         self._events: list[Events] = []
-        self._inputs: list[tuple[int, Input]] = []
+        self._inputs: list[tuple[int, ExternalInput]] = []
         self._input_stream: Stream | None = None
         self._rows_source: np.ndarray | None = None
         self._rows: RowSelection
@@ -280,7 +280,7 @@ class Recorder:
                 parked = self.sim.state.parked[int(world)]
                 self._add(RowSelection(parked.bodies.ints), int(step), parked)
 
-    def _on_input(self, world: int, given: Input) -> None:
+    def _on_input(self, world: int, given: ExternalInput) -> None:
         """Keep what came from outside."""
         self._inputs.append((world, given))
 

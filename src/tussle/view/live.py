@@ -16,7 +16,7 @@ from tussle.engine.simulation import Simulation
 from tussle.engine.step_end import world_result
 from tussle.errors import ParameterError, PluginError
 from tussle.pacing import Pace
-from tussle.record.inputs import Input
+from tussle.record.inputs import ExternalInput
 from tussle.view.curves import GameCurves
 from tussle.view.drawn import DrawCollector, Shape
 from tussle.view.entity import EntityState, entity_state
@@ -81,7 +81,7 @@ class Live:
         snapshot_every: float = 1.0,
         memory: float = 256.0,
         viewer: Mapping[str, Any] | None = None,
-        inputs: Sequence[Input] = (),
+        inputs: Sequence[ExternalInput] = (),
     ) -> None:
         for name, value in (("snapshot_every", snapshot_every), ("memory", memory)):
             if not 0.0 < value < math.inf:

@@ -17,7 +17,7 @@ from tussle.view.frame import Event, frame_of
 from tussle.view.timeline import History, Timeline
 
 if TYPE_CHECKING:
-    from tussle.record import Input, Recorder
+    from tussle.record import ExternalInput, Recorder
 
 MAX_EVENTS = 100_000
 """Events up to which collisions are kept."""
@@ -69,7 +69,12 @@ class Player:
     """
 
     def __init__(
-        self, simulation: Simulation, world: int, every: float, limit: float, inputs: Sequence[Input] = ()
+        self,
+        simulation: Simulation,
+        world: int,
+        every: float,
+        limit: float,
+        inputs: Sequence[ExternalInput] = (),
     ) -> None:
         self.simulation, self.world = simulation, world
         self.timeline = Timeline(simulation, world, every, 0.5 * limit)

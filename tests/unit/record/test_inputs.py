@@ -9,7 +9,7 @@ import pytest
 from tussle import Block, Mission, Recorder, Simulation, load_run
 from tussle.api import EasyAutonomy, Field, Handle, Interaction, Message, Output, Param, State, Subscribe
 from tussle.errors import ParameterError, RecordError
-from tussle.record import Input, load_inputs
+from tussle.record import ExternalInput, load_inputs
 from tussle.record.input_table import inputs_of
 from tussle.record.schema import INPUTS
 from tussle.stock import SingleIntegrator
@@ -163,7 +163,7 @@ def test_an_object_is_told_and_not_repeated(tmp_path):
         sim.publish(Course, why=object())
         sim.step()
     inputs = load_inputs(tmp_path / "run")
-    assert inputs == (Input(0, "message", "Course", None),)
+    assert inputs == (ExternalInput(0, "message", "Course", None),)
     with Simulation(mission(), 1) as sim:
         with pytest.raises(
             ParameterError, match=r"the message Course before step 0 held an object that was not recorded"
@@ -176,11 +176,17 @@ def test_an_object_is_told_and_not_repeated(tmp_path):
 @pytest.mark.parametrize(
     ("given", "error"),
     [
-        (Input(2, "message", "Coarse", {}), r"there is no message 'Coarse' \(did you mean 'Course'\?\)"),
-        (Input(2, "message", "Course", {"too": 1.0}), r"Course has no field 'too' \(did you mean 'to'\?\)"),
-        (Input(2, "column", "fleet.Steered.hast", [1.0] * 5), r"hast.*did you mean 'haste'"),
         (
-            Input(2, "column", "fleet.Steered.haste", ["a"] * 5),
+            ExternalInput(2, "message", "Coarse", {}),
+            r"there is no message 'Coarse' \(did you mean 'Course'\?\)",
+        ),
+        (
+            ExternalInput(2, "message", "Course", {"too": 1.0}),
+            r"Course has no field 'too' \(did you mean 'to'\?\)",
+        ),
+        (ExternalInput(2, "column", "fleet.Steered.hast", [1.0] * 5), r"hast.*did you mean 'haste'"),
+        (
+            ExternalInput(2, "column", "fleet.Steered.haste", ["a"] * 5),
             r"Steered.haste = 'a' is not allowed; it takes a finite number",
         ),
     ],
