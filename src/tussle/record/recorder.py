@@ -18,6 +18,8 @@ from tussle.errors import MissionError, RecordError
 from tussle.mission import PluginFile, to_xml
 from tussle.record import run_file
 from tussle.record.events import BIRTH, END, Events
+from tussle.record.input_table import batch_of
+from tussle.record.inputs import ExternalInput
 from tussle.record.plugin_columns import ColumnReader, select
 from tussle.record.plugin_copies import plugin_copies
 from tussle.record.results import ResultRows
@@ -26,6 +28,8 @@ from tussle.record.schema import (
     EVENTS,
     EVENTS_FILE,
     FILES,
+    INPUTS,
+    INPUTS_FILE,
     LINKS,
     LINKS_FILE,
     MISSION_FILE,
@@ -125,6 +129,8 @@ class Recorder:
         recorded = [source.column for source in self._columns.sources]
         self._buffer = RowBuffer([b.name for b in mission.blocks], clock.start, clock.dt, recorded)
         self._events: list[Events] = []
+        self._inputs: list[tuple[int, ExternalInput]] = []
+        self._input_stream: Stream | None = None
         self._rows_source: np.ndarray | None = None
         self._rows: RowSelection
         self._common_step = -1
@@ -205,6 +211,7 @@ class Recorder:
         sim.observers.append(self._observe)
         sim.events.listen(self._on_events)
         sim.events.traffic.append(self._traffic)
+        sim.events.inputs.append(self._on_input)
 
     # -- during the game ------------------------------------------------------------------------------------------------------
 
@@ -273,6 +280,18 @@ class Recorder:
                 parked = self.sim.state.parked[int(world)]
                 self._add(RowSelection(parked.bodies.ints), int(step), parked)
 
+    def _on_input(self, world: int, given: ExternalInput) -> None:
+        """Keep what came from outside."""
+        self._inputs.append((world, given))
+
+    def _write_inputs(self) -> None:
+        if self._input_stream is None:
+            self._input_stream = Stream(self.directory / INPUTS_FILE, INPUTS)
+            self._streams.append(self._input_stream)
+        clock = self.sim.state.context.clock
+        inputs, self._inputs = self._inputs, []
+        self._write(self._input_stream, batch_of(inputs, lambda step: clock.start + step * clock.dt))
+
     def _write(self, stream: Stream, batch: pa.RecordBatch) -> None:
         try:
             stream.write(batch)
@@ -293,6 +312,8 @@ class Recorder:
             self._write(self._shape_stream, drawn)
         if self._results and (changes := self._results.take()):
             self._write(self._result_stream, changes)
+        if self._inputs:
+            self._write_inputs()
         self._flush_at = time.monotonic() + self.flush_every
 
     def _take_events(self) -> pa.RecordBatch:
@@ -361,6 +382,8 @@ class Recorder:
         if self._observe in self.sim.observers:
             self.sim.observers.remove(self._observe)
         self.sim.events.forget(self._on_events)
+        if self._on_input in self.sim.events.inputs:
+            self.sim.events.inputs.remove(self._on_input)
         if self._traffic in self.sim.events.traffic:
             self.sim.events.traffic.remove(self._traffic)
         self._traffic.close()
