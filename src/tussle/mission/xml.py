@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from tussle.declare.texts import shown, truth
-from tussle.errors import MissionError, ParameterError, TussleError
+from tussle.errors import MissionError, ParameterError, TussleError, clipped
 from tussle.mission import codecs
 from tussle.mission.catalogue import KINDS, Catalogue
 from tussle.mission.data_files import DataFiles, data_folders
@@ -144,7 +144,7 @@ def _read(
     read = SourceReader(settings, problems, budget, search).read(path)
     if read.root.tag != "runscript":
         raise MissionError(
-            f"{read.root.place}: the root tag is <{read.root.tag[:80]}>; it must be <runscript>"
+            f"{read.root.place}: the root tag is <{clipped(read.root.tag)}>; it must be <runscript>"
         )
     files = tuple(f if isinstance(f, PluginFile) else PluginFile.of(f) for f in plugin_files)
     catalogue = _catalogue(read, compat, files)

@@ -13,7 +13,8 @@ from typing import Any, Protocol, Self
 import numpy as np
 import pyarrow as pa
 
-from tussle.errors import MissionError, ParameterError, RecordError
+from tussle.documents import POSITIVE, Maybe, check_argument
+from tussle.errors import MissionError, RecordError
 from tussle.mission import PluginFile, to_xml
 from tussle.mission.write import with_seed
 from tussle.record import run_file
@@ -110,9 +111,8 @@ class Recorder:
         scene_files: Mapping[str, Path] | None = None,
         plugin_files: Sequence[PluginFile] = (),
     ) -> None:
-        for name, value in (("period", period), ("flush_every", flush_every)):
-            if value is not None and not 0.0 < value < float("inf"):
-                raise ParameterError(f"{name} = {value!r} is not allowed; it takes a number of seconds > 0")
+        check_argument("period", period, Maybe(POSITIVE))
+        check_argument("flush_every", flush_every, Maybe(POSITIVE))
         check_file_names(sim.mission.networks)
         self.sim, self.directory = sim, Path(directory)
         self.period, self.flush_every = period, flush_every

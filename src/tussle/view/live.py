@@ -11,6 +11,7 @@ from typing import Any, Self
 import numpy as np
 
 from tussle.declare.messages import CustomKeyPress, Message, WorldPointClicked
+from tussle.documents import POSITIVE, check_argument
 from tussle.engine.result import WorldResult
 from tussle.engine.simulation import Simulation
 from tussle.engine.step_end import world_result
@@ -83,9 +84,8 @@ class Live:
         viewer: Mapping[str, Any] | None = None,
         inputs: Sequence[ExternalInput] = (),
     ) -> None:
-        for name, value in (("snapshot_every", snapshot_every), ("memory", memory)):
-            if not 0.0 < value < math.inf:
-                raise ParameterError(f"{name} = {value!r} is not allowed; it takes a number > 0")
+        check_argument("snapshot_every", snapshot_every, POSITIVE)
+        check_argument("memory", memory, POSITIVE)
         if not 0 <= world < simulation.n_worlds:
             raise ParameterError(
                 f"world = {world!r} is not allowed; there are worlds 0 to {simulation.n_worlds - 1}"
