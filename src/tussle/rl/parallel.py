@@ -10,7 +10,7 @@ import numpy as np
 from pettingzoo import ParallelEnv
 
 from tussle.errors import ParameterError, nearest_name
-from tussle.rl.environments import Pictures, check_options, metadata_of, reset_one, told_of_one
+from tussle.rl.environments import Pictures, check_options, in_parts, metadata_of, reset_one, told_of_one
 from tussle.rl.swarm import Swarm
 
 DTYPE, SHAPE = attrgetter("dtype"), attrgetter("shape")
@@ -33,7 +33,12 @@ class TaskParallelEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]  # Pett
         self._number = {name: a for a, name in enumerate(self.possible_agents)}
         self.observation_spaces = {name: self.task.observation_space(a) for name, a in self._number.items()}
         self.action_spaces = {name: self.task.action_space(a) for name, a in self._number.items()}
-        self._width = {name: space.shape[0] for name, space in self.observation_spaces.items()}
+        self.state_space = self.task.state_space
+        block = dict(zip(self.possible_agents, self.task.agent_block.tolist(), strict=True))
+        self._block, widths = block, [sum(w) for w in self.task.widths.values()]
+        self._width = {name: widths[block[name]] for name in self.possible_agents}
+        self._n_levels = [sum(map(int, decoder.sizes)) for decoder in self.task.decoders]
+        self._has_parts = any(self.task.parts.values())
         self._is_same_width = len(set(self._width.values())) == 1
         swarm = self.swarm
         kind = self.task.dtype if swarm.is_continuous else np.int64
@@ -50,6 +55,9 @@ class TaskParallelEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]  # Pett
 
     def _observed(self, agents: list[str], numbers: Any) -> dict[str, np.ndarray]:
         obs = self.swarm.obs[0][numbers]
+        if self._has_parts:
+            rows = {name: row[: self._width[name]].copy() for name, row in zip(agents, obs, strict=True)}
+            return {name: in_parts(self.task, row, self._block[name]) for name, row in rows.items()}
         if self._is_same_width:
             return dict(zip(agents, obs.copy() if isinstance(numbers, slice) else obs, strict=True))
         return {name: row[: self._width[name]].copy() for name, row in zip(agents, obs, strict=True)}
@@ -64,7 +72,16 @@ class TaskParallelEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]  # Pett
         self._at = self._numbers(self.agents)
         self._pictures.follow()
         info = {"seed": int(self.swarm.seeds[0]), **told_of_one(self.swarm)}
-        return self._observed(self.agents, self._at), {name: dict(info) for name in self.agents}
+        infos = {name: dict(info) for name in self.agents}
+        self._add_masks(infos)
+        return self._observed(self.agents, self._at), infos
+
+    def _add_masks(self, infos: dict[str, dict[str, Any]]) -> None:
+        """Add the levels that agents may choose to their infos, if the task masks actions."""
+        if self.swarm.masks is not None:
+            masks = self.swarm.masks[0].astype(np.int8)
+            for name, info in infos.items():
+                info["action_mask"] = masks[self._number[name], : self._n_levels[self._block[name]]]
 
     def _living(self) -> list[str]:
         alive = self.swarm.alive[0]
@@ -108,6 +125,7 @@ class TaskParallelEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]  # Pett
                     "r": float(swarm.returns[0, self._number[name]]),
                     "l": int(swarm.lengths[0]),
                 }
+        self._add_masks(infos)
         return self._observed(reported, numbers), rewards, deaths, ends, infos
 
     def _by_name(self, agents: list[str], values: np.ndarray) -> dict[str, Any]:
@@ -169,8 +187,8 @@ class TaskParallelEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]  # Pett
         return self._pictures.picture()
 
     def state(self) -> np.ndarray:
-        """Observations of all agents side by side."""
-        return np.array(self.swarm.obs[0]).reshape(-1)
+        """What a centralised critic sees, in `state_space`: the task's `state`, or the observations of all agents side by side."""
+        return np.array(self.swarm.central_state[0])
 
     def close(self) -> None:
         self._pictures.close()

@@ -86,7 +86,7 @@ class Situation:
         if name not in self._columns:
             bodies = self.simulation.state.population.bodies
             source = bodies.derived(name) if name in DERIVED else getattr(bodies, name)
-            table = source.reshape(-1, source.shape[-1])
+            table = np.atleast_2d(source)
             out = np.zeros((self.alive.size, len(table)))
             take(np.ascontiguousarray(table, float), self.rows, self.agents, out)
             self._columns[name] = out.reshape(*self.alive.shape, *source.shape[:-1])
