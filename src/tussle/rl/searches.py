@@ -20,7 +20,7 @@ from tussle.numeric.neighbors.search import DIFFERENT, SAME, TABLE, table_of
 
 GUESS = 1.1
 """Distance of the next search over that of the last k-th other, and its factor while too few are found: 1.5."""
-MOST_RANKED = 48
+MAX_RANKED = 48
 """Candidates that are compared all with all, instead of inserted one after another."""
 
 
@@ -66,7 +66,7 @@ def scan_world(me, x, y, z, radius, mode, wanted, table, start, end, found):
 @lean_device
 def sort_keys(keys, items, n, k, places, sorted_keys, sorted_items):
     """Write the k smallest of n different keys, and their items, in order; the rest of the n places may be written, too."""
-    if n > MOST_RANKED:
+    if n > MAX_RANKED:
         for i in range(n):
             if i < k:
                 put_key(keys[i], items[i], i, sorted_keys, sorted_items)
