@@ -75,6 +75,5 @@ def test_settings_come_from_a_file_and_the_command_line(tmp_path, monkeypatch):
     assert "resume with the same task and settings" in call(*command, "--resume").stderr
     assert call(*command, "--set", "worlds=2", "--resume").returncode == 0
     (tmp_path / "ppo.toml").write_text("world = 4\n")
-    assert "ppo.toml: there is no setting 'world' (did you mean 'worlds'?)" in " ".join(
-        call(*command).stderr.split()
-    )
+    done = call("train", "tussle/RLSimple-v0", "--settings", "ppo.toml")
+    assert "ppo.toml: there is no setting 'world' (did you mean 'worlds'?)" in " ".join(done.stderr.split())
