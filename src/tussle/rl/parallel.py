@@ -30,6 +30,7 @@ class TaskParallelEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]  # Pett
         self.possible_agents = list(self.task.agent_names)
         self.agents: list[str] = []
         self._at: Any = []  # their numbers
+        self._rows: Any = None  # of the body table, which change when agents die or are born
         self._number = {name: a for a, name in enumerate(self.possible_agents)}
         self.observation_spaces = {name: self.task.observation_space(a) for name, a in self._number.items()}
         self.action_spaces = {name: self.task.action_space(a) for name, a in self._number.items()}
@@ -106,9 +107,11 @@ class TaskParallelEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]  # Pett
         swarm.step(self._actions[None])
         self._pictures.follow()
         dead = swarm.terminations[0]
-        self.agents = [] if swarm.over[0] else self._living()
-        reported, numbers = before, self._at
-        if self.agents != before:
+        is_same = swarm.now.rows is self._rows and not swarm.over[0]
+        if not is_same:
+            self.agents = [] if swarm.over[0] else self._living()
+        reported, numbers, self._rows = before, self._at, swarm.now.rows
+        if not is_same and self.agents != before:
             known, is_dead = set(before), dead.tolist()
             reported = before + [name for name in self.agents if name not in known]
             self.agents = [name for name in self.agents if not is_dead[self._number[name]]]
@@ -139,7 +142,8 @@ class TaskParallelEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]  # Pett
 
     def _take(self, actions: Mapping[str, Any]) -> None:
         """Write the actions to one array."""
-        if list(actions) != self.agents and actions.keys() != set(self.agents):
+        is_in_order = list(actions) == self.agents
+        if not is_in_order and actions.keys() != set(self.agents):
             for name in actions:
                 if name not in self.agents:
                     known = name in self._number
@@ -151,7 +155,7 @@ class TaskParallelEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]  # Pett
                     raise ParameterError(f"there is an action for {name!r}, which {text}")
             missing = next(name for name in self.agents if name not in actions)
             raise ParameterError(f"the action of {missing!r} is missing")
-        many = [actions[name] for name in self.agents]
+        many = list(actions.values()) if is_in_order else [actions[name] for name in self.agents]
         if not (many and self._take_rows(many)):
             self._take_each(many)
 

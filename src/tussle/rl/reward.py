@@ -11,7 +11,7 @@ import numpy as np
 from tussle.api.bodies import DERIVED, FLOATS
 from tussle.errors import ParameterError, listed, nearest_name
 from tussle.record.events import CAPTURE, COLLISION, DEATH, FLAG
-from tussle.rl.kernels import take
+from tussle.rl.kernels import SETTLE, take
 from tussle.rl.observation import TEAMS, AgentRows, Component, Means, NearestOthers, block_numbers
 
 if TYPE_CHECKING:
@@ -273,17 +273,15 @@ class Term:
         """
         values = np.asarray(self.function(now))
         worlds, agents = out.shape
-        all_were_alive = bool(now.was_alive.all())
         if values.shape not in ((), (worlds, agents), (worlds, 1), (1, agents)):
             raise ParameterError(
                 f"returns shape {values.shape}; it returns ({worlds}, {agents}), a value for each world and agent, or ({worlds}, 1), one "
                 "for each world, such as values[:, None]"
             )
         np.multiply(values, self.weight, out=out, casting="same_kind")
-        if not all_were_alive:
-            out[~now.was_alive] = 0.0
-        if not np.isfinite(out).all():
-            world, agent = np.argwhere(~np.isfinite(out))[0].tolist()
+        wrong = int(SETTLE[out.dtype](out.reshape(-1), now.was_alive.reshape(-1)))
+        if wrong >= 0:
+            world, agent = divmod(wrong, agents)
             raise ParameterError(
                 f"is {out[world, agent]} for agent {agent} in world {world}; it returns finite numbers "
                 "(`simulation.read` has NaN for the dead)"
@@ -294,7 +292,7 @@ class Term:
             for team in np.unique(now.team):
                 mine = now.team == team
                 out[:, mine] = out[:, mine].sum(axis=1, keepdims=True)
-        if self.per != "agent" and not all_were_alive:
+        if self.per != "agent":
             out *= now.was_alive
 
 

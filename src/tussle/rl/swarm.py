@@ -19,7 +19,6 @@ from tussle.rl.reward import COUNTED, NOBODY, Situation
 from tussle.rl.searches import SharedSearches
 from tussle.rl.task import Task
 
-NEVER = np.zeros((), bool)
 AUTORESET = ("next_step", "same_step", "disabled")
 
 
@@ -416,25 +415,26 @@ class Swarm:
 
     def _end(self, due: np.ndarray | None) -> None:
         """Find the agents and worlds whose episode ends."""
-        task, now, state = self.task, self.now, self.simulation.state
+        task, now = self.task, self.now
         np.copyto(self.terminations, now.died)
-        over = np.zeros(self.n_worlds, bool)
-        if self._check_ends:
-            over |= self._are_decided()
-        ends = NEVER if self._never_ends else np.asarray(task.ends(now))
-        if ends.shape not in ((), over.shape) or ends.dtype != bool:
-            raise ParameterError(
-                f"{type(task).__name__}.ends returns {ends.dtype} of shape {ends.shape}; "
-                f"it returns truth values, {over.shape}, one per world"
-            )
-        over |= ends
-        self.terminations |= over[:, None] & self.alive
-        self.truncations[:] = self.late[:] = False
-        if task.n_steps:
-            np.greater(state.context.clock.step >= task.n_steps, over, out=self.late)
-            if self.late.any():
-                self.truncations |= self.late[:, None] & self.alive
-                over |= self.late
+        over = self._are_decided() if self._check_ends else np.zeros(self.n_worlds, bool)
+        if not self._never_ends:
+            ends = np.asarray(task.ends(now))
+            if ends.shape not in ((), over.shape) or ends.dtype != bool:
+                raise ParameterError(
+                    f"{type(task).__name__}.ends returns {ends.dtype} of shape {ends.shape}; "
+                    f"it returns truth values, {over.shape}, one per world"
+                )
+            over |= ends
+        if over.any():
+            self.terminations |= over[:, None] & self.alive
+        self.truncations.fill(False)
+        self.late.fill(False)
+        step = self.simulation.state.context.clock.step
+        if task.n_steps and step.max() >= task.n_steps:
+            np.greater(step >= task.n_steps, over, out=self.late)
+            self.truncations |= self.late[:, None] & self.alive
+            over |= self.late
         np.copyto(self.over, over)
 
     def _are_decided(self) -> np.ndarray:
