@@ -238,11 +238,16 @@ def collisions(now: Situation) -> np.ndarray:
     return np.asarray(now.count("collision") + now.count("collision", "other"))
 
 
+def dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Scalar products of vectors, (..., 3) each; several times as fast as a sum over the last axis, with the same bits."""
+    return np.asarray(a[..., 0] * b[..., 0] + a[..., 1] * b[..., 1] + a[..., 2] * b[..., 2])
+
+
 def closing(now: Situation, blocks: str) -> np.ndarray:
     """Speed at which the distance to the nearest entity of some blocks decreases [m/s], (W, A); 0 without any, and for the dead."""
     near = now.nearest(blocks)
     towards = near.offset / np.maximum(near.distance, 1e-300)[..., None]
-    return -np.asarray((near.relative_vel * towards).sum(axis=-1))
+    return -dot(near.relative_vel, towards)
 
 
 @dataclass(frozen=True)
