@@ -136,6 +136,18 @@ class PluginReader:
             self.problems.error(written.where(""), str(error))
             return None
 
+    def faster(self, plugin: Plugin | None, written: PluginTag, is_moving: bool) -> Plugin | None:
+        """Return the plugin that stands in for that of a tag, if there is one; it has its name. `is_moving` as of `Plugin.stand_in`."""
+        if plugin is None:
+            return None
+        name, values, note = plugin.stand_in(is_moving)
+        if note:
+            self.problems.note(written.where(""), f"{written.plugin} {note}")
+        if not name:
+            return plugin
+        states = written.attributes.get("states")
+        return self.catalogue.load(name)(name=plugin.instance_name, rate=plugin.rate, states=states, **values)
+
     def _class_of(self, written: PluginTag) -> type[Plugin] | None:
         place, tag = written.where(""), "behavior" if written.tag == "behaviors" else written.tag
         if not written.plugin:
