@@ -13,9 +13,9 @@ from typing import Any
 from tussle.checksums import BLANK, MARK, is_intact, sealed
 from tussle.errors import ParameterError, TussleError, listed, nearest_name
 
-MOST_BYTES = 1 << 25
+MAX_BYTES = 1 << 25
 """Maximum size of a document. Parsed JSON takes up to about twenty times as much memory."""
-LONGEST_SHOWN = 80
+MAX_SHOWN = 80
 CHECKSUM = "checksum"
 """Field of a document that holds its checksum."""
 DAMAGED = f"is damaged: its checksum does not match its content; if it was edited, remove the line {CHECKSUM!r} to read it as it is"
@@ -35,7 +35,7 @@ def size_of(path: Path, most: int | None = None) -> int:
     return about.st_size
 
 
-def read_bytes(path: Path, error: type[TussleError], most: int = MOST_BYTES) -> bytes:
+def read_bytes(path: Path, error: type[TussleError], most: int = MAX_BYTES) -> bytes:
     """Read a file. All files that a mission names are read by this function, or by `read_text`.
 
     Raises:
@@ -49,7 +49,7 @@ def read_bytes(path: Path, error: type[TussleError], most: int = MOST_BYTES) -> 
         raise error(f"{path}: cannot be read: {getattr(reason, 'strerror', None) or reason}") from None
 
 
-def read_text(path: Path, error: type[TussleError], most: int = MOST_BYTES) -> str:
+def read_text(path: Path, error: type[TussleError], most: int = MAX_BYTES) -> str:
     """Read a UTF-8 text file.
 
     Raises:
@@ -187,7 +187,7 @@ def _scalar_problem(value: Any, rule: Rule, where: str) -> str:
     """Describe what is wrong with a value that is not a container."""
     if isinstance(rule, tuple):
         is_there = any(type(value) is type(one) and value == one for one in rule)
-        guess = nearest_name(value[:LONGEST_SHOWN], rule) if isinstance(value, str) else ""
+        guess = nearest_name(value[:MAX_SHOWN], rule) if isinstance(value, str) else ""
         return (
             "" if is_there else f"{where} = {_shown(value)} is not allowed{guess}; {listed(map(repr, rule))}"
         )
@@ -224,7 +224,7 @@ def _shown(value: Any) -> str:
         if not isinstance(value, int) or abs(value) < 10**80
         else "a number of more than 80 digits"
     )
-    return text if len(text) <= LONGEST_SHOWN else text[:LONGEST_SHOWN] + "..."
+    return text if len(text) <= MAX_SHOWN else text[:MAX_SHOWN] + "..."
 
 
 def _first(problems: Iterable[str]) -> str:

@@ -9,7 +9,7 @@ import time
 import pytest
 
 from tussle.documents import (
-    MOST_BYTES,
+    MAX_BYTES,
     Checked,
     Document,
     Either,
@@ -124,7 +124,7 @@ def test_only_regular_files_of_bounded_size_are_opened(tmp_path):
     (tmp_path / "itself").symlink_to("itself")
     (tmp_path / "folder").mkdir()
     (tmp_path / "long").touch()
-    os.truncate(tmp_path / "long", MOST_BYTES + 1)
+    os.truncate(tmp_path / "long", MAX_BYTES + 1)
     (tmp_path / "bytes").write_bytes(b"\xff")
     began = time.monotonic()
     for name, said in {

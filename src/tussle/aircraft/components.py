@@ -15,7 +15,7 @@ from tussle.errors import listed
 IGNORED = ("description", "documentation", "limitation", "output")
 OPERATORS = {"eq": "==", "==": "==", "ne": "!=", "!=": "!=", "gt": ">", ">": ">", "ge": ">=", ">=": ">=", "lt": "<", "<": "<",
              "le": "<=", "<=": "<="}  # fmt: skip
-MOST_DELAY, SHORTEST_STEP_RATE = 10_000, 240
+MAX_DELAY, MAX_STEP_RATE = 10_000, 240
 INTEGRALS = {
     "rect": "{x}", "trap": "0.5 * ({x} + {x1})", "ab2": "1.5 * {x} - 0.5 * {x1}", "ab3": "(23.0 * {x} - 16.0 * {x1} + 5.0 * {x2}) / 12.0",
 }  # fmt: skip
@@ -92,10 +92,10 @@ class ControlPart:
             return
         amount, code = found.number(), self.code
         is_time = found.get("type", "time") != "frames"
-        most = amount * SHORTEST_STEP_RATE if is_time else amount
-        if not 0.0 <= most <= MOST_DELAY:
+        most = amount * MAX_STEP_RATE if is_time else amount
+        if not 0.0 <= most <= MAX_DELAY:
             raise found.error(
-                f"a delay of {amount:g} is not allowed; it is at most {MOST_DELAY} frames of 1/{SHORTEST_STEP_RATE} s"
+                f"a delay of {amount:g} is not allowed; it is at most {MAX_DELAY} frames of 1/{MAX_STEP_RATE} s"
             )
         # JSBSim's ring of n outputs delays by n - 1 frames.
         ring, place = code.ring(int(most) + 2), self.state("delay")

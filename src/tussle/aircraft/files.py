@@ -15,7 +15,7 @@ FOLDERS = {
     "part": ("",),
 }
 NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.+ -]*(/[A-Za-z0-9_][A-Za-z0-9_.+ -]*){0,3}")
-MOST_FILES = 200
+MAX_FILES = 200
 
 
 def package_root() -> Path:
@@ -67,8 +67,8 @@ class Files:
 
     def _read(self, path: Path) -> Element:
         self.read.append(path)
-        if len(self.read) > MOST_FILES:
-            raise AircraftError(f"{path}: the aircraft has more than {MOST_FILES} files")
+        if len(self.read) > MAX_FILES:
+            raise AircraftError(f"{path}: the aircraft has more than {MAX_FILES} files")
         return read_file(path)
 
     def find(self, node: Element, name: str, kind: str) -> Element:

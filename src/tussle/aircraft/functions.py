@@ -20,7 +20,7 @@ SUMS = {"product": " * ", "sum": " + ", "difference": " - "}
 KEYS = ("row", "column", "table", "axis4")
 OTHERS = ("avg", "ifthen", "and", "or", "not", "min", "max", "pi", "todegrees", "toradians", "log2", "log10", "fraction",
           "interpolate1d", "switch", "property", "value", "table", "function")  # fmt: skip
-MOST_CELLS = 200_000
+MAX_CELLS = 200_000
 
 
 def content(node: Element) -> list[Element]:
@@ -183,8 +183,8 @@ def _break(node: Element) -> float:
 
 def _numbers(node: Element) -> list[float]:
     words = "".join(node.chunks).split()
-    if len(words) > MOST_CELLS:
-        raise node.error(f"the table has more than {MOST_CELLS} numbers")
+    if len(words) > MAX_CELLS:
+        raise node.error(f"the table has more than {MAX_CELLS} numbers")
     try:
         numbers = [float(word) for word in words]
     except ValueError as reason:

@@ -12,7 +12,7 @@ from tussle.aircraft.functions import emit_function
 from tussle.aircraft.mass import indexed
 from tussle.aircraft.node import Element
 
-MOST_CONTACTS = 64
+MAX_CONTACTS = 64
 BRAKES = {"LEFT": "left", "RIGHT": "right", "CENTER": "center"}
 CASTERS = 360.0
 
@@ -41,8 +41,8 @@ def read_ground(node: Element | None) -> list[Contact]:
     if node is None:
         return []
     contacts = [_contact(each) for each in node.find_all("contact")]
-    if len(contacts) > MOST_CONTACTS:
-        raise node.error(f"it has {len(contacts)} contacts; the limit is {MOST_CONTACTS}")
+    if len(contacts) > MAX_CONTACTS:
+        raise node.error(f"it has {len(contacts)} contacts; the limit is {MAX_CONTACTS}")
     return contacts
 
 

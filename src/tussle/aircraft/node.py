@@ -12,10 +12,10 @@ from tussle.aircraft.units import factor
 from tussle.documents import read_bytes
 from tussle.errors import ParameterError
 
-MOST_BYTES = 8 << 20
-MOST_NODES = 200_000
-DEEPEST = 60
-MOST_ENTITIES, LONGEST_ENTITY = 100, 100
+MAX_BYTES = 8 << 20
+MAX_NODES = 200_000
+MAX_DEPTH = 60
+MAX_ENTITIES, MAX_ENTITY = 100, 100
 
 
 class AircraftError(ParameterError):
@@ -132,7 +132,7 @@ def read_file(path: Path) -> Element:
     Raises:
         AircraftError: It cannot be read, is no XML, or exceeds a limit.
     """
-    return read_text(read_bytes(path, AircraftError, MOST_BYTES), path.name)
+    return read_text(read_bytes(path, AircraftError, MAX_BYTES), path.name)
 
 
 def read_text(data: bytes, name: str) -> Element:
@@ -149,9 +149,9 @@ def read_text(data: bytes, name: str) -> Element:
         nonlocal count
         count += 1
         node = Element(tag, f"{name}:{parser.CurrentLineNumber}", attributes)
-        if count > MOST_NODES or len(stack) > DEEPEST:
+        if count > MAX_NODES or len(stack) > MAX_DEPTH:
             raise node.error(
-                f"the file has more than {MOST_NODES} elements, or they nest deeper than {DEEPEST}"
+                f"the file has more than {MAX_NODES} elements, or they nest deeper than {MAX_DEPTH}"
             )
         stack[-1].children.append(node)
         stack.append(node)
@@ -165,12 +165,12 @@ def read_text(data: bytes, name: str) -> Element:
         if (
             value is None
             or is_parameter
-            or len(value) > LONGEST_ENTITY
+            or len(value) > MAX_ENTITY
             or "&" in value
-            or entities > MOST_ENTITIES
+            or entities > MAX_ENTITIES
         ):
             raise AircraftError(
-                f"{name}:{parser.CurrentLineNumber}: entity {entity_name[:40]!r}: only {MOST_ENTITIES} short texts without "
+                f"{name}:{parser.CurrentLineNumber}: entity {entity_name[:40]!r}: only {MAX_ENTITIES} short texts without "
                 "references can be declared"
             )
 

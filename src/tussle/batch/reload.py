@@ -95,9 +95,11 @@ def recorded_run(
     )
     is_timed = "time" in (info["mission"].get("end_conditions") or ())
     mission = loaded.mission.ending_by_time() if is_timed else loaded.mission
-    said = worlds[world]
-    is_over = info["is_complete"] and said.get("state_hash")
-    return PlannedRun(loaded, mission, said["seed"], said["state_hash"] if is_over else "", "recording")
+    recorded = worlds[world]
+    is_over = info["is_complete"] and recorded.get("state_hash")
+    return PlannedRun(
+        loaded, mission, recorded["seed"], recorded["state_hash"] if is_over else "", "recording"
+    )
 
 
 def _not_known(code: DirectoryCode) -> str:

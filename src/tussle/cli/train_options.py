@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
-from tussle.cli.options import LARGEST_SEED, PluginOptions, argument, check_positive, flag, option
+from tussle.cli.options import MAX_SEED, PluginOptions, argument, check_positive, flag, option
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -24,9 +24,7 @@ class TrainOptions(PluginOptions):
     ] = 10.0
     seed: Annotated[
         int,
-        option(
-            "N", "Seed of worlds, weights and exploration.", min=0, max=LARGEST_SEED // 2, shows_default=True
-        ),
+        option("N", "Seed of worlds, weights and exploration.", min=0, max=MAX_SEED // 2, shows_default=True),
     ] = 1
     worlds: Annotated[int, option("N", "Worlds that play at once.", min=1, shows_default=True)] = 32
     directory: Annotated[
@@ -84,7 +82,7 @@ class LeagueOptions(PluginOptions):
             "N",
             "Seed of the first game; the others follow it.",
             min=0,
-            max=LARGEST_SEED // 2,
+            max=MAX_SEED // 2,
             shows_default=True,
         ),
     ] = 1

@@ -13,12 +13,11 @@ from tussle.cli.play_options import PageOptions, ReplayOptions, ViewOptions
 from tussle.cli.progress import compiling
 from tussle.cli.summary import Speed, show_summary
 from tussle.cli.terminal import OK, TERMINATED, err, out, say, say_error, say_note
+from tussle.pacing import POLL_PERIOD
 from tussle.view.live import Live
 from tussle.view.page.compare import Comparison
 from tussle.view.page.server import Page
 from tussle.view.recording import Recording
-
-NAP = 0.1  # [s] so that Ctrl-C is handled in time
 
 
 def view(options: ViewOptions) -> int:
@@ -139,5 +138,5 @@ def watch(page: Page, interrupt: Interrupt, is_done: Callable[[], bool]) -> int:
             reported = page.game_error
             say_error(str(reported))
             err().print("The page can rewind the game to the steps before the error. Ctrl-C ends it.")
-        time.sleep(NAP)
+        time.sleep(POLL_PERIOD)
     return TERMINATED if interrupt.code == TERMINATED else OK

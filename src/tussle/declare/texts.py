@@ -10,9 +10,9 @@ from tussle.declare import units
 from tussle.errors import ParameterError
 
 TRUE, FALSE = ("true", "1", "yes", "on"), ("false", "0", "no", "off")
-MOST_ITEMS = 100_000
+MAX_ITEMS = 100_000
 """Maximum count of numbers in one value."""
-LONGEST_SHOWN = 80
+MAX_SHOWN = 80
 ROW = re.compile(r"\s*\[([^\[\]]*)\]")
 FRAMES = ("XYZ", "GPS")
 
@@ -20,7 +20,7 @@ Part = tuple[str, str, str]
 """A component of a value: its name, its SI unit, and the unit of a bare number."""
 
 
-def shown(text: str, longest: int = LONGEST_SHOWN) -> str:
+def shown(text: str, longest: int = MAX_SHOWN) -> str:
     """Quote external text for a message, on one line and shortened."""
     flat = " ".join(text.split())
     return repr(flat if len(flat) <= longest else flat[:longest] + "...")

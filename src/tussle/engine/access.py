@@ -50,9 +50,9 @@ def _columns(owner: Any) -> dict[str, Numbers]:
     return {k: c for k, c in owner.declared(Numbers).items() if k not in is_shared}
 
 
-def _follow(state: SimulationState, path: str) -> tuple[Any, tuple[str, ...], str, Numbers]:
+def _located(state: SimulationState, path: str) -> tuple[Any, tuple[str, ...], str, Numbers]:
     """Resolve a path. Returns the block or world plugin, the plugin path in the block, the column's name and its declaration."""
-    owners, name = paths.follow(path, paths.MissionRoot(state.mission), paths.inside, _columns)
+    owners, name = paths.resolve(path, paths.MissionRoot(state.mission), paths.inside, _columns)
     return owners[0], tuple(p.instance_name for p in owners[1:]), name, _columns(owners[-1])[name]
 
 
@@ -73,7 +73,7 @@ def capacity(state: SimulationState, number: int) -> int:
 
 def read(state: SimulationState, path: str) -> tuple[np.ndarray, np.ndarray]:
     """See `Simulation.read`."""
-    head, key, name, column = _follow(state, path)
+    head, key, name, column = _located(state, path)
     if not isinstance(head, Block):
         values = np.moveaxis(_world_column(state, path, name), -1, 0).copy()
         return values, np.ones(len(values), bool)
@@ -122,7 +122,7 @@ def _world_column(state: SimulationState, path: str, name: str) -> np.ndarray:
 
 def write(state: SimulationState, path: str, values: Any) -> None:
     """See `Simulation.write`."""
-    head, key, name, column = _follow(state, path)
+    head, key, name, column = _located(state, path)
     if isinstance(values, str):
         try:
             values = column.read(values)

@@ -18,10 +18,11 @@ from tussle.declare.displays import counted, line, listing, page, table
 from tussle.declare.messages import Message, Messages
 from tussle.engine import access
 from tussle.engine.arrivals import reset, spawn_due
+from tussle.engine.calls import Schedule
 from tussle.engine.reseed import renew_keys
 from tussle.engine.result import WorldResult
 from tussle.engine.rows import place
-from tussle.engine.schedule import Call, compose
+from tussle.engine.schedule import compose
 from tussle.engine.snapshot import Snapshot, restore, snapshot, state_hash
 from tussle.engine.state import SimulationState
 from tussle.engine.step_end import remove_dead, world_result
@@ -52,6 +53,7 @@ class Simulation:
     Attributes:
         state: All data of the simulation.
         observers: Functions called with the simulation at the beginning of each step.
+        schedule: The calls of a step, in order; `schedule.insert` adds one.
         events: Listeners for births, deaths, captures, collisions and ends of worlds.
 
     Raises:
@@ -86,10 +88,11 @@ class Simulation:
         self.state.context.simulation = weakref.ref(self)
         self.state.context.move = partial(place, self.state)
         self.events = self.state.events
-        self.events.on_change = self.state.population.on_new_group = self._forget_schedule
+        self.schedule = Schedule(partial(compose, self.state), weakref.ref(self))
+        self.events.on_change = self.state.population.on_new_group = self.schedule.forget
         try:
             self.reset(range(self.n_worlds))
-            self._schedule: list[Call] | None = compose(self.state)
+            _ = self.schedule.calls
             for text in self.state.message_bus.network_mismatches():
                 warnings.warn(text, RuntimeWarning, stacklevel=2)
         except Exception:
@@ -115,9 +118,6 @@ class Simulation:
                     f"{plugin.instance_name} supports at most {most} worlds in one stack, not {len(seeds)}"
                 )
 
-    def _forget_schedule(self) -> None:
-        self._schedule = None
-
     # -- running ------------------------------------------------------------------------------------------------------------
 
     @property
@@ -134,13 +134,6 @@ class Simulation:
     def is_over(self) -> bool:
         """True if all worlds have ended."""
         return self.state.n_running == 0
-
-    @property
-    def schedule(self) -> list[Call]:
-        """Calls of one step, in order."""
-        if self._schedule is None:
-            self._schedule = compose(self.state)
-        return self._schedule
 
     def step(self, n: int = 1) -> None:
         """Advance all running worlds by n steps.
@@ -162,7 +155,7 @@ class Simulation:
             if self.observers and not self.events.is_replaying:
                 for observer in self.observers:
                     observer(self)
-            for call in self.schedule:
+            for call in self.schedule.calls:
                 call.run()
         except PluginError as error:
             self._stop(error)

@@ -21,7 +21,7 @@ from tussle.mission.spec import BLOCK_VALUES, RUN, Block
 from tussle.mission.tags import BASE, ENTITY, ENTITY_ATTRIBUTES, MANY, TagSpec
 from tussle.world.scene import Base, Origin
 
-MOST_TEAM = 2**31 - 1
+MAX_TEAM = 2**31 - 1
 
 
 def expand_entity_common(root: Node, problems: Problems, budget: Budget) -> None:
@@ -212,7 +212,7 @@ class EntityReader:
         fields = Fields(node, ENTITY, self.problems)
         self.places[name] = node.place
         self._note_differences(fields)
-        team = fields.read("team_id", lambda text: codecs.integer(text, -MOST_TEAM, MOST_TEAM))
+        team = fields.read("team_id", lambda text: codecs.integer(text, -MAX_TEAM, MAX_TEAM))
         values: dict[str, Any] = {"name": name, "team": team, "count": self._count(fields)}
         values |= self._body(fields) | self._births(fields, values["count"])
         taken: set[str] = set()

@@ -12,7 +12,7 @@ from tussle.mission import codecs
 from tussle.mission.catalogue import Catalogue
 from tussle.mission.entities import block_names
 from tussle.mission.node import Node
-from tussle.mission.paths import follow
+from tussle.mission.paths import resolve
 from tussle.mission.plugin_tags import free_name
 from tussle.mission.spec import RUN
 from tussle.mission.tags import ENTITY, PLUGIN
@@ -64,7 +64,7 @@ class TreeEditor:
                 f"allowed are also paths: run.dt, BLOCK.TAG, BLOCK.PLUGIN.ATTRIBUTE, PLUGIN.ATTRIBUTE"
             )
         try:
-            owners, name = follow(path, self.root, self._inside, self._values)
+            owners, name = resolve(path, self.root, self._inside, self._values)
             owner = owners[-1]
             text = codecs.written(value, *self._units(owner, name))
             if owner.tag == "run" and owner not in self.root.children:

@@ -17,7 +17,7 @@ from tussle.errors import ParameterError, TussleError, listed, nearest_name
 from tussle.mission.spec import BLOCK_VALUES, MISSION_VALUES, RUN, Block, Mission
 
 
-def follow(
+def resolve(
     path: str,
     start: Any,
     inside: Callable[[Any], Mapping[str, Any]],
@@ -105,7 +105,7 @@ def with_value(mission: Mission, path: str, value: Any) -> Mission:
         ParameterError: The path does not exist, or the value is not allowed.
         MissionError: The mission is invalid with this value.
     """
-    owners, name = follow(path, MissionRoot(mission), inside, settable)
+    owners, name = resolve(path, MissionRoot(mission), inside, settable)
     try:
         new = owners[-1].replace(**{name: value})
     except TussleError as error:

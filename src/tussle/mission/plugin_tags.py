@@ -19,7 +19,7 @@ from tussle.mission.node import Budget, Node
 from tussle.mission.problems import Place, Problems
 from tussle.mission.tags import PLUGIN
 
-MOST_NESTED = 4
+MAX_NESTED = 4
 """Maximum nesting of behaviors."""
 LOOP_RATE = Param(0.0, unit="1/s", ge=0.0, lt=math.inf)
 RATED = ("autonomy", "controller", "sensor", "behaviors")
@@ -253,8 +253,8 @@ class PluginReader:
             if parameter in cls.historic_attributes.least_zero and text.strip().startswith("-"):
                 text = "0"
             return cls.params()[parameter].convert(text, from_geodetic=self.from_geodetic)
-        if depth >= MOST_NESTED:
-            raise MissionError(f"plugins are nested more than {MOST_NESTED} deep")
+        if depth >= MAX_NESTED:
+            raise MissionError(f"plugins are nested more than {MAX_NESTED} deep")
         place = written.where(parameter)
         taken: set[str] = set()
         column = cls.children()[parameter]
@@ -279,7 +279,7 @@ class PluginReader:
                 repaired = " ".join(codecs.inline_text(*plugin) for plugin in found)
             except TussleError:
                 raise error from None
-            self.problems.mended(place, str(error), repaired)
+            self.problems.note_repair(place, str(error), repaired)
             return found
 
     def _not_a_parameter(self, written: PluginTag, cls: type[Plugin], attribute: str) -> None:

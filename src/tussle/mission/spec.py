@@ -33,9 +33,9 @@ OF_WORLD = ("interactions", "metrics", "networks")
 """Names of the plugins of a block, and of a mission."""
 UPDATES = ("synchronous", "sequential", "random", "random_in_blocks")
 ONE_BY_ONE = UPDATES[1:]
-"""Those in which entities decide and move one after another."""
+"""Update orders in which entities decide and move one after another."""
 SHUFFLED = UPDATES[2:]
-"""Those with another order of the entities in each step, which take one world at a time."""
+"""Update orders that are drawn anew in each step; they take one world at a time."""
 PLACEMENTS = ("normal", "uniform")
 WITHOUT_SPACE = ("wait", "fail")
 

@@ -313,7 +313,7 @@ class _WorldReader:
         if value < 1.0 or value == int(value):
             return codecs.integer(text, 1, most)
         whole = codecs.integer(str(int(value)), 1, most)
-        self.problems.mended(
+        self.problems.note_repair(
             fields.place("motion_multiplier"), f"motion_multiplier: {shown(text)} is not a whole number", f'motion_multiplier="{whole}"'
         )  # fmt: skip
         return whole

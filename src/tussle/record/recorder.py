@@ -38,9 +38,9 @@ from tussle.record.shapes import ShapeRows
 from tussle.record.stream import Stream
 from tussle.record.traffic import Traffic, check_file_names
 
-MOST_RESULTS = 100_000
+MAX_RESULTS = 100_000
 """Changes of results that are collected between two flushes."""
-MOST_LETTERS = 4_000_000
+MAX_CHARACTERS = 4_000_000
 """Characters of shapes that are collected between two flushes."""
 
 
@@ -230,9 +230,9 @@ class Recorder:
                 if bodies.ints is not self._rows_source:
                     self._rows_source, self._rows = bodies.ints, RowSelection(bodies.ints)
                 self._add(self._rows, step)
-        n_letters = self._shapes.n_letters if self._shapes else 0
+        n_characters = self._shapes.n_characters if self._shapes else 0
         n_results = self._results.n if self._results else 0
-        if time.monotonic() >= self._flush_at or n_letters > MOST_LETTERS or n_results > MOST_RESULTS:
+        if time.monotonic() >= self._flush_at or n_characters > MAX_CHARACTERS or n_results > MAX_RESULTS:
             self.flush()
 
     def _observe_apart(self, sim: Recorded) -> None:

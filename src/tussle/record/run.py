@@ -13,7 +13,7 @@ import pyarrow as pa
 import pyarrow.csv
 
 from tussle.declare.displays import MAX_LINE, counted, line, listing, page, shortened, table
-from tussle.documents import DAMAGED, MOST_BYTES, read_text
+from tussle.documents import DAMAGED, MAX_BYTES, read_text
 from tussle.errors import MissingExtraError, ParameterError, RecordError, listed, nearest_name
 from tussle.mission.limits import Limits
 from tussle.record.arrow_file import read_batches
@@ -181,7 +181,7 @@ class Run:
         path = self.path / MISSION_FILE
         return self._text(path, Limits.large().text) if path.exists() else None
 
-    def _text(self, path: Path, most: int = MOST_BYTES) -> str:
+    def _text(self, path: Path, most: int = MAX_BYTES) -> str:
         """The text of a file.
 
         Raises:

@@ -15,6 +15,7 @@ from tussle.rl.environments import TaskEnv, TaskVectorEnv, make, make_vec, regis
 from tussle.rl.games import Consensus, NearOrigin, PredatorPrey, PredatorsAndPrey, PredatorTeam, PreyEscape
 from tussle.rl.observation import Component, Each, Means, NearestOthers, Own, Sectors
 from tussle.rl.parallel import TaskParallelEnv, parallel_env
+from tussle.rl.particles import SimpleAdversary, SimpleSpread, SimpleTag
 from tussle.rl.policy_file import write_policy
 from tussle.rl.reward import FoundOthers, Situation, Term, alive, captured, captures, collisions, died
 from tussle.rl.robots import Coverage, FindWay, Formation, Hover, ReachPoint
@@ -48,6 +49,9 @@ __all__ = [
     "PreyEscape",
     "ReachPoint",
     "Sectors",
+    "SimpleAdversary",
+    "SimpleSpread",
+    "SimpleTag",
     "Situation",
     "Swarm",
     "Task",
@@ -92,6 +96,9 @@ for _task in (
     PredatorsAndPrey,
     PreyEscape,
     ReachPoint,
+    SimpleAdversary,
+    SimpleSpread,
+    SimpleTag,
 ):
     register(f"tussle/{_task.__name__}-v0", _task)
 register("tussle/RLSimple-v0", NearOrigin)

@@ -99,6 +99,14 @@ def _of_worlds(
     return {**info, **{f"_{name}": worlds.copy() for name in info}}
 
 
+def _terms_of_worlds(swarm: Swarm, worlds: np.ndarray) -> dict[str, Any]:
+    """Sums of each term over the agents of some worlds, (W,), as an info of their own, since a term may have any name."""
+    terms: dict[str, Any] = {}
+    for name, term in swarm.terms.items():
+        terms |= {name: np.where(worlds, term.sum(axis=1), 0), f"_{name}": worlds.copy()}
+    return {"terms": terms, "_terms": worlds.copy()}
+
+
 class Pictures:
     """Shows world 0 of a swarm: as pictures, or in a browser while it plays. Starts at the first use.
 
@@ -185,9 +193,7 @@ class TaskVectorEnv(VectorEnv[Any, Any, Any]):
         """Infos at the end of the episodes that are over, as Gymnasium's own vector environments give them."""
         swarm = self.swarm
         info = _of_worlds(swarm.final_alive, swarm.final_seeds, swarm.final_params, over)
-        for name, term in swarm.terms.items():
-            info[name], info[f"_{name}"] = np.where(over, term.sum(axis=1), 0), over.copy()
-        return info
+        return {**info, **_terms_of_worlds(swarm, over)}
 
     def reset(self, *, seed: Any = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
         """Start new episodes.
@@ -229,9 +235,7 @@ class TaskVectorEnv(VectorEnv[Any, Any, Any]):
                 )
             given = given.reshape(self.num_envs, 1, -1)
         obs, rewards, _, _, _ = swarm.step(given)
-        info = self._info()
-        for name, term in swarm.terms.items():
-            info[name], info[f"_{name}"] = term.sum(axis=1), np.ones(self.num_envs, bool)
+        info = {**self._info(), **_terms_of_worlds(swarm, np.ones(self.num_envs, bool))}
         over = swarm.over.copy()
         if over.any() and swarm.autoreset == "same_step":
             info["final_obs"], info["_final_obs"] = self._seen(swarm.final_obs), over
@@ -291,7 +295,7 @@ class TaskEnv(gymnasium.Env[Any, Any]):
             )
         swarm = self.swarm
         obs, rewards, _, _, _ = swarm.step(given.reshape(1, swarm.n_agents, -1))
-        info = {**self._info(), **{name: float(term.sum()) for name, term in swarm.terms.items()}}
+        info = {**self._info(), "terms": {name: float(term.sum()) for name, term in swarm.terms.items()}}
         over, late = bool(swarm.over[0]), bool(swarm.late[0])
         self._pictures.follow()
         return self._seen(obs), float(rewards.sum(dtype=float)), over and not late, over and late, info

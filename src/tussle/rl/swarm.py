@@ -16,8 +16,10 @@ from tussle.errors import ParameterError, SnapshotError, WiringError, listed
 from tussle.rl.episodes import Episodes, checked_params, checked_seeds, checked_value, checked_worlds
 from tussle.rl.observation import AgentRows, Each
 from tussle.rl.reward import COUNTED, NOBODY, Situation
+from tussle.rl.searches import SharedSearches
 from tussle.rl.task import Task
 
+NEVER = np.zeros((), bool)
 AUTORESET = ("next_step", "same_step", "disabled")
 
 
@@ -100,12 +102,14 @@ class Swarm:
             raise ParameterError(f"{type(task).__name__}: action: all blocks have ranges, or all have levels")
         self.action_width = max(len(d.free) for d in task.decoders)
         self._ints: np.ndarray | None = None
+        self._searches = SharedSearches(self.n_worlds * self.n_agents)
         self._parts: list[AgentRows] = []
         self._watching: list[AgentRows] = []
         seen = [task.components(b.name) for b in task.blocks]
         self._is_alike = all(each == seen[0] for each in seen) and not any(
             isinstance(c, Each) for c in seen[0]
         )
+        self._columns, self._never_ends = task.columns, type(task).ends is Task.ends
         self._check_ends = True
         self._told: dict[str, Any] | None = None
 
@@ -212,7 +216,7 @@ class Swarm:
                 agents = bodies.world[rows] * self.n_agents + (first + place)
                 alive[agents], ids[agents] = True, bodies.id[rows]
                 team, span = bodies.team[rows].astype(float), (int(rows[0]), int(rows[-1]) + 1)
-                self._parts.append(AgentRows(name, group, rows, agents, team, kept, span))
+                self._parts.append(AgentRows(name, group, rows, agents, team, kept, span, self._searches))
         joined = self._joined(self._parts)
         self._watching = joined if self._is_alike else self._parts
         self.now.look(joined)
@@ -250,13 +254,9 @@ class Swarm:
                 mask[worlds] = True
                 kept = mask[part.agents // self.n_agents]
                 some = replace(part, rows=part.rows[kept], agents=part.agents[kept], team=part.team[kept])
-            column = 0
             if len(some.rows):
-                for component, width in zip(
-                    self.task.components(part.block), self.task.widths[part.block], strict=True
-                ):
+                for component, column in self._columns[part.block]:
                     component.write(self.simulation, some, column, out)
-                    column += width
 
     # -- steps -------------------------------------------------------------------------------------------------------------
 
@@ -366,7 +366,7 @@ class Swarm:
         over = np.zeros(self.n_worlds, bool)
         if self._check_ends:
             over |= self._are_decided()
-        ends = np.asarray(task.ends(now))
+        ends = NEVER if self._never_ends else np.asarray(task.ends(now))
         if ends.shape not in ((), over.shape) or ends.dtype != bool:
             raise ParameterError(
                 f"{type(task).__name__}.ends returns {ends.dtype} of shape {ends.shape}; "

@@ -104,6 +104,8 @@ class Task:
         for name, term in self.reward.items():
             if not isinstance(term, Term):
                 raise ParameterError(f"{where}: reward {name!r} is {term!r}, not a Term")
+            if name.startswith("_"):  # "_NAME" is the mask of NAME in the infos of vector environments
+                raise ParameterError(f"{where}: reward {name!r}: the name of a term does not begin with _")
         _ = self.widths
 
     # -- what follows ------------------------------------------------------------------------------------------------------
@@ -175,6 +177,14 @@ class Task:
 
     def acts(self, block: str) -> list[Act]:
         return self._of("action", block, Act)
+
+    @cached_property
+    def columns(self) -> dict[str, list[tuple[Component, int]]]:
+        """Components of each block's observation, each with its first column."""
+        return {
+            name: list(zip(self.components(name), np.cumsum([0, *widths]).tolist(), strict=False))
+            for name, widths in self.widths.items()
+        }
 
     @cached_property
     def widths(self) -> dict[str, list[int]]:

@@ -15,12 +15,13 @@ from tussle.engine.result import WorldResult
 from tussle.engine.simulation import Simulation
 from tussle.engine.step_end import world_result
 from tussle.errors import ParameterError, PluginError
+from tussle.pacing import Pace
 from tussle.view.curves import GameCurves
 from tussle.view.drawn import DrawCollector, Shape
 from tussle.view.entity import EntityState, entity_state
-from tussle.view.frame import Event, Frame, Lens
+from tussle.view.frame import Event, Frame, FrameReader
 from tussle.view.latest import LINGER, LatestValue
-from tussle.view.pacing import Pace, checked_warp, faster, slower
+from tussle.view.pacing import checked_warp, faster, slower
 from tussle.view.playback import Order, PlaybackController
 from tussle.view.player import Injection, Player
 from tussle.view.scenery import Scenery, scenery_of
@@ -34,7 +35,7 @@ STATE_PERIOD = 0.1
 """Least time between two readings of an entity [s]."""
 RESULT_PERIOD = 0.5
 """Least time between two provisional results [s]."""
-FORGET_AFTER = 10.0
+FORGET_TIME = 10.0
 """Time after the last request at which the state of an entity is dropped [s]."""
 
 
@@ -92,7 +93,9 @@ class Live:
         self._player = Player(simulation, world, snapshot_every, 1e6 * memory)
         self._playback = PlaybackController(self._player, self._pace, self._collector, is_paused, self._renew)
         ring = self._playback.ring
-        self._frame: LatestValue[Frame] = LatestValue(Lens(simulation, world).frame, FRAME_PERIOD, ring)
+        self._frame: LatestValue[Frame] = LatestValue(
+            FrameReader(simulation, world).frame, FRAME_PERIOD, ring
+        )
         self._shapes: LatestValue[tuple[Shape, ...]] = LatestValue(self._collector.shapes, FRAME_PERIOD, ring)
         self._result: LatestValue[WorldResult | None] = LatestValue(self._make_result, RESULT_PERIOD, ring)
         self._entities: dict[int, LatestValue[EntityState | None]] = {}
@@ -389,7 +392,7 @@ class Live:
         else:
             self._collector.close()
         for who, latest in list(self._entities.items()):
-            if latest.idle_for > FORGET_AFTER:
+            if latest.idle_for > FORGET_TIME:
                 self._entities.pop(who, None)
 
     def _make_result(self) -> WorldResult | None:

@@ -17,7 +17,7 @@ from tussle.view.timeline import History, Timeline
 if TYPE_CHECKING:
     from tussle.record import Recorder
 
-MOST_EVENTS = 100_000
+MAX_EVENTS = 100_000
 """Events up to which collisions are kept."""
 
 
@@ -260,8 +260,8 @@ class Player:
         for i in range(len(reported)):
             if reported.world[i] != self.world:
                 continue
-            if len(self.events) >= MOST_EVENTS and reported.kind == "collision":
-                self.note(f"collisions after event {MOST_EVENTS} are not kept")
+            if len(self.events) >= MAX_EVENTS and reported.kind == "collision":
+                self.note(f"collisions after event {MAX_EVENTS} are not kept")
                 return
             if reported.step[i] < self.step and not self.simulation.events.is_replaying:
                 self._begin_episode(int(reported.step[i]))

@@ -23,6 +23,7 @@ from tussle.numeric.neighbors.law import Law
 from tussle.numeric.neighbors.walk_python import walk_in_python
 from tussle.numeric.neighbors.walk_text import Part, WalkText
 from tussle.numeric.rk4 import label
+from tussle.numeric.source import define
 
 
 @dataclass(frozen=True)
@@ -158,11 +159,8 @@ def make_walk(laws: Sequence[Law], where: Law | None, code_of: Callable[[str], s
     out = "(I2w F2w) i8 (i8 i8) i8 -> i8" if text.lists_pairs else "F2w i8 (i8 i8) i8"
 
     def written(lines: Iterable[str], points: str, suffix: str) -> Kernel:
-        exec("\n".join(lines) + "\n", scope)  # noqa: S102 - generated here; authors' code is in separate functions
-        made = scope["walk"]
-        made.__module__ = laws[0].function.__module__
         names = (law.function.__qualname__ for law in (*laws, *([where] if where else [])))
-        made.__qualname__ = "+".join(names) + suffix
+        made = define(lines, scope, laws[0].function.__module__, "+".join(names) + suffix)
         return kernel(f"(I2 I2 I) ({points}) ({other}) ({own}) {out}")(made)
 
     kernel_of_blocks = written(text.lines(), "F2 F2", "")

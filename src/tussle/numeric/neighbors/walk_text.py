@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 
 from tussle.numeric.neighbors.law import OTHER, Law
+from tussle.numeric.source import indented
 
 START = {"min": math.inf, "max": -math.inf, "nearest": math.nan}
 """Initial values of reductions that do not start at 0."""
@@ -382,8 +383,3 @@ def square(radii: tuple[str | float, ...]) -> str:
         value = f"by_row_{radius}[i]" if isinstance(radius, str) else repr(float(radius))
         text = f"min({text}, square_of({value}))" if text else f"square_of({value})"
     return text
-
-
-def indented(depth: int, lines: Iterable[str]) -> Iterator[str]:
-    """Indent lines."""
-    return ("    " * depth + line for line in lines)

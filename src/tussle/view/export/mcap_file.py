@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from foxglove import Context
 
 CHUNK = 1 << 20
-"""Bytes that are compressed together; a reader that jumps reads as much."""
+"""Size of a chunk that is compressed as one [B]; a reader that seeks reads one."""
 SPACING = 0.5
 """Length of a model as a share of the median distance between neighbours, where it would be too small to be seen."""
 N_SPACINGS = 20
@@ -140,7 +140,7 @@ def default_scale(recording: Recording) -> float:
 
 
 class _Messages:
-    """The topics of a file that is open."""
+    """Writer of the topics of an open file."""
 
     def __init__(self, recording: Recording, report: McapReport, context: Context) -> None:
         from foxglove import Channel

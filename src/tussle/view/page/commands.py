@@ -11,12 +11,12 @@ from typing import Any
 from tussle.errors import ParameterError
 from tussle.view.live import Live
 
-FARTHEST = 1e12
-"""Of any coordinate [m] and time [s]."""
-LARGEST_ID = 2**31 - 1
+MAX_COORDINATE = 1e12
+"""Largest coordinate [m] and time [s] in a command."""
+MAX_ID = 2**31 - 1
 REACH = 1e3
 """Largest distance of a point of the world, in sizes of the scene."""
-MOST_WANTED = 64
+MAX_WANTED = 64
 """Quantities of the curves that one browser can choose."""
 CUSTOM_KEY = ";"
 """The key that is kept for the plugins, as in SCRIMMAGE."""
@@ -37,7 +37,7 @@ class Check:
     allowed: str
 
 
-def number(low: float = -FARTHEST, high: float = FARTHEST) -> Check:
+def number(low: float = -MAX_COORDINATE, high: float = MAX_COORDINATE) -> Check:
     """Return a check for a number in a range; NaN is never allowed."""
     return Check(
         lambda value: type(value) in (int, float) and low <= value <= high,
@@ -52,7 +52,7 @@ def whole(low: int, high: int) -> Check:
     )
 
 
-WHO = whole(0, LARGEST_ID)
+WHO = whole(0, MAX_ID)
 POINT = Check(
     lambda value: isinstance(value, list) and len(value) == 3 and all(map(number().holds, value)),
     "x, y, z in m",
@@ -60,12 +60,12 @@ POINT = Check(
 WANTED = Check(
     lambda value: (
         isinstance(value, list)
-        and len(value) <= MOST_WANTED
+        and len(value) <= MAX_WANTED
         and all(
             isinstance(v, list) and len(v) == 2 and isinstance(v[0], str) and WHO.holds(v[1]) for v in value
         )
     ),
-    f"at most {MOST_WANTED} pairs of a name and an id",
+    f"at most {MAX_WANTED} pairs of a name and an id",
 )
 KEY = Check(lambda value: value == CUSTOM_KEY, f"the key {CUSTOM_KEY}")
 WARP = Check(
@@ -111,7 +111,7 @@ def game_commands(live: Live) -> dict[str, Command]:
         "warp": Command(warp, {"value": WARP}),
         "faster": Command(live.faster),
         "slower": Command(live.slower),
-        "reset": Command(live.reset, {"seed": whole(0, LARGEST_ID)}),
+        "reset": Command(live.reset, {"seed": whole(0, MAX_ID)}),
         "point": Command(point, {"pos": POINT}),
         "key": Command(live.publish_key, {"key": KEY}),
     }
@@ -128,18 +128,18 @@ def read_command(text: Any, commands: Mapping[str, Command]) -> tuple[str, dict[
         ParameterError: A field's value is not allowed.
     """
     try:
-        said = json.loads(text, parse_constant=lambda _: math.nan) if isinstance(text, str) else None
+        given = json.loads(text, parse_constant=lambda _: math.nan) if isinstance(text, str) else None
     except (ValueError, RecursionError):
         return None
-    if not isinstance(said, dict):
+    if not isinstance(given, dict):
         return None
-    name = said.pop("do", None)
+    name = given.pop("do", None)
     command = commands.get(name) if isinstance(name, str) else None
-    if command is None or said.keys() != command.fields.keys():
+    if command is None or given.keys() != command.fields.keys():
         return None
     for key, check in command.fields.items():
-        if not check.holds(said[key]):
-            shown = repr(said[key])
+        if not check.holds(given[key]):
+            shown = repr(given[key])
             shown = shown if len(shown) <= SHOWN else f"{shown[:SHOWN]} …"
             raise ParameterError(f"{key} = {shown} is not allowed; it takes {check.allowed}")
-    return name, said
+    return name, given

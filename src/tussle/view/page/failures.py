@@ -9,7 +9,7 @@ from pathlib import Path
 
 from tussle.errors import TussleError
 
-MOST_FAILURES = 20
+MAX_FAILURES = 20
 """Largest number of listed failures."""
 LONGEST = 300
 """Characters of one."""
@@ -31,8 +31,8 @@ class Failures:
         """Add an error to the list and return its line."""
         self.last = error
         text = _in_words(error)
-        if text not in self.texts and len(self.texts) <= MOST_FAILURES:
-            is_full = len(self.texts) == MOST_FAILURES
+        if text not in self.texts and len(self.texts) <= MAX_FAILURES:
+            is_full = len(self.texts) == MAX_FAILURES
             self.texts.append("further errors of the page are not listed" if is_full else text)
         return text
 

@@ -14,8 +14,9 @@ from typing import TYPE_CHECKING, Any, Self, TypeVar
 
 from tussle.engine.simulation import Simulation
 from tussle.errors import MissingExtraError, ParameterError, TussleError, listed, nearest_name
-from tussle.view.pacing import Pace, checked_warp
-from tussle.view.page.access import MOST_BROWSERS, Access, bound_socket
+from tussle.pacing import Pace
+from tussle.view.pacing import checked_warp
+from tussle.view.page.access import MAX_BROWSERS, Access, bound_socket
 from tussle.view.page.web_server import WebServer
 from tussle.view.serve.session import ENCODINGS, Session, encoded
 
@@ -24,14 +25,14 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
-MOST_BYTES = 64 * 1024 * 1024
-"""Of one message from a client."""
-MOST_WAITING = 64
-"""Messages that wait until a client takes them; further states are dropped."""
-MOST_SUBSCRIPTIONS = 64
-"""Of one client."""
+MAX_BYTES = 64 * 1024 * 1024
+"""Largest size of a message from a client [B]."""
+MAX_WAITING = 64
+"""Length of a client's queue of messages; further states are dropped."""
+MAX_SUBSCRIPTIONS = 64
+"""Largest number of subscriptions of a client."""
 SLICE = 0.05
-"""Time for which steps are made before other commands are executed [s]."""
+"""Longest run of steps before other commands are executed [s]."""
 OWN_COMMANDS = ("pause", "play", "step", "subscribe", "unsubscribe")
 
 
@@ -55,7 +56,7 @@ class Client:
     def __init__(self, socket: web.WebSocketResponse) -> None:
         self.socket = socket
         self.subscriptions: dict[int, Subscription] = {}
-        self.waiting: asyncio.Queue[str] = asyncio.Queue(MOST_WAITING)
+        self.waiting: asyncio.Queue[str] = asyncio.Queue(MAX_WAITING)
         self.n_dropped = 0
 
     def offer(self, state: dict[str, Any]) -> None:
@@ -134,13 +135,13 @@ class Server:
         )
         if not reason and "Origin" in headers:
             reason = "This is not open to pages.\n"
-        if not reason and len(self._clients) >= MOST_BROWSERS:
-            reason = f"{MOST_BROWSERS} programs are connected already.\n"
+        if not reason and len(self._clients) >= MAX_BROWSERS:
+            reason = f"{MAX_BROWSERS} programs are connected already.\n"
         if reason:
             return web.Response(status=403, text=reason)
         if "Upgrade" not in headers:
             return web.Response(status=426, text=f"Connect a websocket to {self.url}\n")
-        socket = web.WebSocketResponse(max_msg_size=MOST_BYTES, compress=False, timeout=1.0)
+        socket = web.WebSocketResponse(max_msg_size=MAX_BYTES, compress=False, timeout=1.0)
         await socket.prepare(request)
         client = Client(socket)
         self._clients.append(client)
@@ -216,9 +217,9 @@ class Server:
 
     def _subscribe(self, client: Client, paths: Any, every: int, encoding: str) -> dict[str, Any]:
         wanted = (paths,) if isinstance(paths, str) else tuple(paths)
-        if not wanted or len(client.subscriptions) >= MOST_SUBSCRIPTIONS:
+        if not wanted or len(client.subscriptions) >= MAX_SUBSCRIPTIONS:
             raise ParameterError(
-                f"a client has 1 to {MOST_SUBSCRIPTIONS} subscriptions, each of at least one path"
+                f"a client has 1 to {MAX_SUBSCRIPTIONS} subscriptions, each of at least one path"
             )
         _check_count("every", every)
         if encoding not in ENCODINGS:

@@ -16,7 +16,7 @@ from tussle.world.rays.files import BY_TRIMESH, bytes_of, corners
 from tussle.world.rays.surfaces import MeshPart
 from tussle.world.rays.textures import decoded, reduced
 
-MOST_IMAGES = 32
+MAX_IMAGES = 32
 """Images of a mesh."""
 IMAGES = (".png", ".jpg", ".jpeg", ".tif", ".tiff")
 
@@ -41,7 +41,7 @@ def read_parts(
         those that do not exist.
 
     Raises:
-        ParameterError: An image cannot be read or is too large, or the mesh has more than `MOST_IMAGES`.
+        ParameterError: An image cannot be read or is too large, or the mesh has more than `MAX_IMAGES`.
         TussleError: It names a file that `check` refuses.
     """
     if path.suffix.lower() not in BY_TRIMESH:
@@ -80,8 +80,8 @@ def _parts(
         image = _image(mesh.visual)
         key = id(image) if image is not None else 0
         if key and key not in images:
-            if len(images) == MOST_IMAGES:
-                raise ParameterError(f"{path}: the mesh has more than {MOST_IMAGES} images")
+            if len(images) == MAX_IMAGES:
+                raise ParameterError(f"{path}: the mesh has more than {MAX_IMAGES} images")
             images[key] = reduced(str(path), image)
         vertices = trimesh.transform_points(corners(mesh.vertices), matrix) * scale + np.array(position)
         piece, has_colours = _piece(mesh, vertices, bool(key))
@@ -147,7 +147,7 @@ def _embedded(data: bytes) -> Iterator[bytes]:
         uri = str(each.get("uri", ""))
         return base64.b64decode(uri.partition(",")[2]) if uri.startswith("data:") else b""
 
-    for image in content.get("images", ())[: MOST_IMAGES + 1]:
+    for image in content.get("images", ())[: MAX_IMAGES + 1]:
         if "bufferView" in image:
             view = content["bufferViews"][image["bufferView"]]
             buffer = content["buffers"][view["buffer"]]

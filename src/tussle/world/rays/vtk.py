@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 
 from tussle.errors import ParameterError, listed
-from tussle.world.rays.surfaces import MOST_FACES
+from tussle.world.rays.surfaces import MAX_FACES
 
 TYPES = {"float": ">f4", "double": ">f8", "int": ">i4", "long": ">i8", "vtktypeint64": ">i8"}
 CELLS = ("POLYGONS", "TRIANGLE_STRIPS")
@@ -37,8 +37,8 @@ class _Reader:
 
     def array(self, n: int, kind: str) -> np.ndarray:
         """The next n numbers."""
-        if not 0 <= n <= 12 * MOST_FACES:
-            raise ParameterError(f"an array of {n:,} numbers is not allowed; at most {12 * MOST_FACES:,} are")
+        if not 0 <= n <= 12 * MAX_FACES:
+            raise ParameterError(f"an array of {n:,} numbers is not allowed; at most {12 * MAX_FACES:,} are")
         dtype = np.dtype(TYPES[kind])
         if self.is_binary:
             end = self.at + n * dtype.itemsize

@@ -15,7 +15,7 @@ from tussle.world.geodesy import Origin
 METRE, KNOT = 3.28084, 0.5144444
 """SCRIMMAGE's metre [ft] and knot [m/s]."""
 DECIMALS = 6
-"""Of degrees and metres, in which an aircraft is told its place."""
+"""Number of decimals of degrees and metres in positions that are given to JSBSim."""
 
 
 class SphericalEarth(JSBSimAircraft):

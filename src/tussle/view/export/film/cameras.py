@@ -24,7 +24,7 @@ from tussle.view.export.film.prescan import (
 )
 
 VIEW_ANGLE = math.radians(32.0)
-"""Vertical angle of view: a long lens, so that distant entities stay comparable to near ones."""
+"""Vertical angle of view: that of a long lens, so that distant entities stay comparable to near ones."""
 ELEVATION = math.radians(33.0)
 """Elevation of the overview camera above its target."""
 AZIMUTH = math.radians(-105.0)

@@ -41,7 +41,7 @@ KNOT = float(units.NAUTICAL_MILE / 3600)  # [m/s]
 FORWARD_RIGHT_DOWN = np.array([[0.0], [1.0], [0.0], [0.0]])
 """Rotation between body axes forward, left, up and forward, right, down."""
 MIRRORED = np.array([[1.0], [-1.0], [-1.0]])
-"""From axes forward, right, down to forward, left, up, and back."""
+"""Signs that convert axes forward, right, down to forward, left, up, and back."""
 
 
 class TrimParam(Param):
