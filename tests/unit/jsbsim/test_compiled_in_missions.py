@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import shutil
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from tussle import Simulation
+from tussle import Recorder, Simulation
 from tussle.mission import read_mission
 from tussle.plugins.stock.motion import jsbsim_model
 from tussle.plugins.stock.motion.jsbsim_model import compared
@@ -103,6 +105,19 @@ def test_a_flight_that_is_not_jsbsims_is_not_flown(read, monkeypatch):
         compared.unlike_compiled.cache_clear()
     assert isinstance(loaded.mission.blocks[0].motion, JSBSimModel)
     assert "after a second, the compiled aircraft is " in str(loaded.notes)
+
+
+def test_who_only_looks_at_a_run_does_not_call_jsbsim(read, tmp_path):
+    with Simulation(read(hawk()).mission, 1) as sim, Recorder(sim, tmp_path / "run"):
+        sim.step(2)
+    file = tmp_path / "run" / "mission.xml"
+    file.write_text(mission(hawk(), "<speed>23</speed>", HELD))
+    look = f"""import sys
+from tussle.view import Recording
+blocks = Recording({str(tmp_path / "run")!r})._loaded.mission.blocks
+print(type(blocks[0].motion).__name__, "jsbsim" in sys.modules)"""
+    done = subprocess.run([sys.executable, "-c", look], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["JSBSimModel", "False"]
 
 
 def test_scrimmages_laws_stay_with_jsbsim(read):
