@@ -16,6 +16,7 @@ import pyarrow as pa
 from tussle.documents import POSITIVE, Maybe, check_argument
 from tussle.errors import MissionError, RecordError
 from tussle.mission import PluginFile, to_xml
+from tussle.mission.write import with_seed
 from tussle.record import run_file
 from tussle.record.events import BIRTH, END, Events
 from tussle.record.input_table import batch_of
@@ -74,8 +75,8 @@ class Recorder:
         sim: The simulation; recording starts with its present state.
         directory: Run directory; created if it does not exist. It must not hold a run.
         period: Time between recorded states [s]; None records every step.
-        mission_text: Mission file with all its values, saved as `mission.xml`; by default the mission of the simulation is written,
-            if a mission file can hold it.
+        mission_text: Mission file with all its values, saved as `mission.xml`, of a single world with its seed; by default the mission of
+            the simulation is written, if a mission file can hold it.
         parameters: Values that were set in addition to the mission, for `run.json`.
         mission_notes: Notes about the mission file, for `run.json`, see `tussle.mission.Loaded`.
         flush_every: Wall time between flushes [s].
@@ -155,6 +156,9 @@ class Recorder:
                 raise RecordError(
                     f"{self.directory}: holds a run already ({held[0]}); choose another directory, or remove it"
                 )
+            seeds = self.sim.state.context.seeds
+            if mission_text and len(seeds) == 1:
+                mission_text = with_seed(mission_text, int(seeds[0]))
             mission_text = mission_text or self._written_back()
             if mission_text:
                 (self.directory / MISSION_FILE).write_text(mission_text, encoding="utf-8")

@@ -10,6 +10,7 @@ except ImportError:
 
 from tussle.rl.action import Act
 from tussle.rl.computed import Computed
+from tussle.rl.dispersal import Dispersal
 from tussle.rl.draws import choice, uniform
 from tussle.rl.environments import TaskEnv, TaskVectorEnv, make, make_vec, register
 from tussle.rl.games import Consensus, NearOrigin, PredatorPrey, PredatorsAndPrey, PredatorTeam, PreyEscape
@@ -33,6 +34,7 @@ __all__ = [
     "Computed",
     "Consensus",
     "Coverage",
+    "Dispersal",
     "Each",
     "FindWay",
     "Formation",
@@ -87,6 +89,7 @@ for _task in (
     CaptureTheFlag,
     CaptureTheFlagRed,
     Coverage,
+    Dispersal,
     FindWay,
     Formation,
     Hover,

@@ -326,3 +326,20 @@ def take(table, row, place, out):
     for i in range(row.shape[0]):
         for c in range(table.shape[0]):
             out[place[i], c] = table[c, row[i]]
+
+
+def settle(out, was_alive):
+    """Set a term of the reward of those that were dead to 0; all flat. Returns the first place that is not finite, or -1."""
+    for i in range(out.shape[0]):
+        if not was_alive[i]:
+            out[i] = 0.0
+        elif not math.isfinite(out[i]):
+            return i
+    return -1
+
+
+SETTLE = {
+    np.dtype(dtype): kernel(f"{code} B -> i8")(settle)
+    for dtype, code in ((np.float32, "Sw"), (np.float64, "Fw"))
+}
+"""`settle` by type of the numbers."""

@@ -161,14 +161,17 @@ def distances(now: Situation, of: str) -> np.ndarray:
 
 def caught(now: Situation) -> np.ndarray:
     """10 per contact for all adversaries, minus 10 for the agent, which must also stay in the field; agents are the last in a world."""
-    pos = now.pos[..., :2]
-    offset = pos[:, :3] - pos[:, 3:]
-    n_contacts = (np.sqrt((offset * offset).sum(axis=-1)) < 0.075 + REACH).sum(axis=1)
-    side = np.abs(pos[:, 3])
-    outside = np.where(
-        side < 0.9, 0.0, np.where(side < 1.0, (side - 0.9) * 10.0, np.minimum(np.exp(2.0 * side - 2.0), 10.0))
-    )
-    agent = -10.0 * n_contacts - outside[:, 0] - outside[:, 1]
+    x, y = now.pos[..., 0], now.pos[..., 1]
+    dx, dy = x[:, :3] - x[:, 3:], y[:, :3] - y[:, 3:]
+    n_contacts = (np.sqrt(dx * dx + dy * dy) < 0.075 + REACH).sum(axis=1)
+    outside = np.zeros(len(x))
+    for side in np.abs(x[:, 3]), np.abs(y[:, 3]):
+        far = np.flatnonzero(side >= 0.9)
+        bound = np.where(
+            side[far] < 1.0, (side[far] - 0.9) * 10.0, np.minimum(np.exp(2.0 * side[far] - 2.0), 10.0)
+        )
+        outside[far] += bound
+    agent = -10.0 * n_contacts - outside
     return np.stack([10.0 * n_contacts] * 3 + [agent], axis=1)
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from tussle.api.bodies import DERIVED, FLOATS
 from tussle.errors import ParameterError, listed, nearest_name
 from tussle.record.events import CAPTURE, COLLISION, DEATH, FLAG
-from tussle.rl.kernels import take
+from tussle.rl.kernels import SETTLE, take
 from tussle.rl.observation import TEAMS, AgentRows, Component, Means, NearestOthers, block_numbers
 
 if TYPE_CHECKING:
@@ -86,7 +86,7 @@ class Situation:
         if name not in self._columns:
             bodies = self.simulation.state.population.bodies
             source = bodies.derived(name) if name in DERIVED else getattr(bodies, name)
-            table = source.reshape(-1, source.shape[-1])
+            table = np.atleast_2d(source)
             out = np.zeros((self.alive.size, len(table)))
             take(np.ascontiguousarray(table, float), self.rows, self.agents, out)
             self._columns[name] = out.reshape(*self.alive.shape, *source.shape[:-1])
@@ -238,11 +238,16 @@ def collisions(now: Situation) -> np.ndarray:
     return np.asarray(now.count("collision") + now.count("collision", "other"))
 
 
+def dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Scalar products of vectors, (..., 3) each; several times as fast as a sum over the last axis, with the same bits."""
+    return np.asarray(a[..., 0] * b[..., 0] + a[..., 1] * b[..., 1] + a[..., 2] * b[..., 2])
+
+
 def closing(now: Situation, blocks: str) -> np.ndarray:
     """Speed at which the distance to the nearest entity of some blocks decreases [m/s], (W, A); 0 without any, and for the dead."""
     near = now.nearest(blocks)
     towards = near.offset / np.maximum(near.distance, 1e-300)[..., None]
-    return -np.asarray((near.relative_vel * towards).sum(axis=-1))
+    return -dot(near.relative_vel, towards)
 
 
 @dataclass(frozen=True)
@@ -273,17 +278,15 @@ class Term:
         """
         values = np.asarray(self.function(now))
         worlds, agents = out.shape
-        all_were_alive = bool(now.was_alive.all())
         if values.shape not in ((), (worlds, agents), (worlds, 1), (1, agents)):
             raise ParameterError(
                 f"returns shape {values.shape}; it returns ({worlds}, {agents}), a value for each world and agent, or ({worlds}, 1), one "
                 "for each world, such as values[:, None]"
             )
         np.multiply(values, self.weight, out=out, casting="same_kind")
-        if not all_were_alive:
-            out[~now.was_alive] = 0.0
-        if not np.isfinite(out).all():
-            world, agent = np.argwhere(~np.isfinite(out))[0].tolist()
+        wrong = int(SETTLE[out.dtype](out.reshape(-1), now.was_alive.reshape(-1)))
+        if wrong >= 0:
+            world, agent = divmod(wrong, agents)
             raise ParameterError(
                 f"is {out[world, agent]} for agent {agent} in world {world}; it returns finite numbers "
                 "(`simulation.read` has NaN for the dead)"
@@ -294,7 +297,7 @@ class Term:
             for team in np.unique(now.team):
                 mine = now.team == team
                 out[:, mine] = out[:, mine].sum(axis=1, keepdims=True)
-        if self.per != "agent" and not all_were_alive:
+        if self.per != "agent":
             out *= now.was_alive
 
 

@@ -124,3 +124,19 @@ def test_view_takes_a_run_or_a_mission(called):
     assert code == 0, text
     assert load_inputs("again") == load_inputs("run")
     assert load_run("again").info["worlds"][0]["state_hash"] == called
+
+
+def test_the_mission_of_a_run_is_the_game_that_was_played(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for arguments in (
+        ("car_maze", "--seed", 5, "--end", "3", "--out", "a"),
+        ("a/mission.xml", "--end", "3", "--out", "b"),
+    ):
+        code, text = tussle("run", *arguments)
+        assert code == 0, text
+    first, second = (load_run(name).info["worlds"][0] for name in "ab")
+    assert (
+        (first["seed"], first["state_hash"])
+        == (second["seed"], second["state_hash"])
+        == (5, first["state_hash"])
+    )

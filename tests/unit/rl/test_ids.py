@@ -37,7 +37,7 @@ def short(name):
 
 
 def test_all_tasks_are_here():
-    assert len(IDS) == 19
+    assert len(IDS) == 20
 
 
 @pytest.mark.parametrize("name", IDS)
@@ -142,8 +142,10 @@ def test_observations_lie_in_their_space(name):
     swarm = make_swarm(task, 3)
     swarm.reset(seed=1)
     chance = np.random.default_rng(1)
+    low, high = task.limits
     space = world_spaces(task)[0]
-    low, high = (np.atleast_2d(k) for k in (space.low, space.high))
+    boxes = list(space.spaces.values()) if isinstance(space, gymnasium.spaces.Dict) else [space]
+    assert sorted(np.concatenate([b.low.ravel() for b in boxes])) == sorted(low.ravel())
     assert np.isfinite(low).any() or name in UNKNOWN
     assert ((low <= 0) & (high >= 0)).all()
     for _ in range(20):
