@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 
 import pytest
 from tree import python_files, relative
@@ -36,3 +37,15 @@ def test_it_is_called_where_it_belongs(names):
 def test_the_rule_sees_calls():
     assert calls("def f():\n    exec(text, {})", ("exec",))
     assert not calls("executor.submit(exec_all)", ("exec",))
+
+
+def test_limits_have_one_prefix():
+    """MAX_... and MIN_..., so that a reader finds all limits by one search; CODING.md."""
+    wrong = re.compile(r"\b(?:MOST|LEAST|LARGEST|LONGEST|SHORTEST|FEWEST|FARTHEST|NAP|CATCH)_?[A-Z]*\b")
+    found = {
+        f"{relative(path)}: {node.id}"
+        for path in python_files("src")
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store) and wrong.fullmatch(node.id)
+    }
+    assert not found
