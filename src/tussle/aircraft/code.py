@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from tussle.aircraft.node import AircraftError, Element
-from tussle.errors import nearest_name
+from tussle.errors import clipped, nearest_name
 from tussle.numeric.source import INDENT
 
 MAX_LINES = 40_000
@@ -266,7 +266,9 @@ class Code:
         for name, node in self.readers.items():
             if name not in made:
                 near = nearest_name(name, made)
-                message = f"property {name[:120]!r} is read, but nothing that is compiled writes it{near}"
+                message = (
+                    f"property {clipped(name, 120)!r} is read, but nothing that is compiled writes it{near}"
+                )
                 raise AircraftError(message) if node is None else node.error(message)
 
     def slots(self) -> list[str]:

@@ -38,7 +38,7 @@ from tussle.aircraft.mass import emit_mass, read_mass
 from tussle.aircraft.metrics import offer_metrics, read_metrics
 from tussle.aircraft.node import Element
 from tussle.aircraft.propulsion import RUNTIME, Propulsion, read_propulsion
-from tussle.errors import ParameterError, nearest_name
+from tussle.errors import ParameterError, clipped, nearest_name
 from tussle.numeric import store
 from tussle.numeric.kernel import Device, Kernel, jitted, renamed
 from tussle.numeric.source import define
@@ -140,7 +140,7 @@ class CompiledAircraft:
         name = normal(name)
         if name not in self.slots:
             raise ParameterError(
-                f"aircraft {self.name}: there is no property {name[:120]!r} in its state{nearest_name(name, self.slots)}"
+                f"aircraft {self.name}: there is no property {clipped(name, 120)!r} in its state{nearest_name(name, self.slots)}"
             )
         return self.slots[name]
 

@@ -10,7 +10,7 @@ from itertools import pairwise
 from tussle.aircraft.code import Code
 from tussle.aircraft.functions import expression, only, table
 from tussle.aircraft.node import Element
-from tussle.errors import listed
+from tussle.errors import clipped, listed
 
 IGNORED = ("description", "documentation", "limitation", "output")
 OPERATORS = {"eq": "==", "==": "==", "ne": "!=", "!=": "!=", "gt": ">", ">": ">", "ge": ">=", ">=": ">=", "lt": "<", "<": "<",
@@ -235,7 +235,7 @@ class ControlPart:
         ki = code.value(gain.text, gain) if gain is not None else "0.0"
         kind = (gain.get("type") if gain is not None else "") or "ab2"
         if kind not in INTEGRALS:
-            raise self.node.error(f"integration {kind[:40]!r} is not known; {listed(INTEGRALS)}")
+            raise self.node.error(f"integration {clipped(kind)!r} is not known; {listed(INTEGRALS)}")
         dot = self.node.find("pvdot")
         rate = code.value(dot.text, dot) if dot is not None else f"({x} - {x1}) / {dt}"
         trigger = self.parameter("trigger", "0.0")
@@ -410,12 +410,14 @@ def condition(code: Code, node: Element) -> str:
     """
     logic = f" {(node.get('logic') or 'and').lower()} "
     if logic not in (" and ", " or "):
-        raise node.error(f"logic {logic.strip()[:40]!r} is not known; there are: AND, OR")
+        raise node.error(f"logic {clipped(logic.strip())!r} is not known; there are: AND, OR")
     parts = []
     for line in filter(None, (line.strip() for chunk in node.chunks for line in chunk.splitlines())):
         words = line.split()
         if len(words) != 3 or words[1].lower() not in OPERATORS:
-            raise node.error(f"{line[:80]!r} is no condition: property, operator, value; {listed(OPERATORS)}")
+            raise node.error(
+                f"{clipped(line)!r} is no condition: property, operator, value; {listed(OPERATORS)}"
+            )
         parts.append(
             f"{code.value(words[0], node)} {OPERATORS[words[1].lower()]} {code.value(words[2], node)}"
         )

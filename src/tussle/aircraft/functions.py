@@ -8,7 +8,7 @@ from itertools import pairwise
 
 from tussle.aircraft.code import Code
 from tussle.aircraft.node import AircraftError, Element
-from tussle.errors import listed, nearest_name
+from tussle.errors import clipped, listed, nearest_name
 
 TEXTS = ("description", "documentation")
 SAME = {"p": "property", "v": "value", "t": "table", "fn": "function"}
@@ -153,7 +153,7 @@ def _keys(code: Code, node: Element) -> list[str]:
     }
     unknown = [name for name in found if name not in KEYS]
     if unknown:
-        raise node.error(f"lookup {unknown[0][:40]!r} is not known; {listed(KEYS)}")
+        raise node.error(f"lookup {clipped(unknown[0])!r} is not known; {listed(KEYS)}")
     return [code.value(found[name].text, found[name]) for name in KEYS if name in found]
 
 

@@ -11,6 +11,7 @@ from tussle.aircraft.equations import offer
 from tussle.aircraft.functions import emit_function
 from tussle.aircraft.mass import indexed
 from tussle.aircraft.node import Element
+from tussle.errors import clipped
 
 MAX_CONTACTS = 64
 BRAKES = {"LEFT": "left", "RIGHT": "right", "CENTER": "center"}
@@ -49,7 +50,7 @@ def read_ground(node: Element | None) -> list[Contact]:
 def _contact(node: Element) -> Contact:
     kind = node.get("type")
     if kind not in ("BOGEY", "STRUCTURE"):
-        raise node.error(f"contact type {kind[:40]!r} is not known; there are: BOGEY, STRUCTURE")
+        raise node.error(f"contact type {clipped(kind)!r} is not known; there are: BOGEY, STRUCTURE")
     for tag in ("table", "orientation"):
         if node.find(tag) is not None:
             raise node.need(tag).error("it is not supported in a contact")

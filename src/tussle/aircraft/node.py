@@ -10,7 +10,7 @@ from xml.parsers import expat
 
 from tussle.aircraft.units import factor
 from tussle.documents import read_bytes
-from tussle.errors import ParameterError
+from tussle.errors import ParameterError, clipped
 
 MAX_BYTES = 8 << 20
 MAX_NODES = 200_000
@@ -50,7 +50,7 @@ class Element:
 
     def error(self, message: str) -> AircraftError:
         """An error at this place."""
-        return AircraftError(f"{self.place}: <{self.tag[:80]}>: {message}")
+        return AircraftError(f"{self.place}: <{clipped(self.tag)}>: {message}")
 
     def find_all(self, *tags: str) -> list[Element]:
         """The children with one of the tags."""
@@ -87,14 +87,14 @@ class Element:
         try:
             value = float(text)
         except ValueError:
-            raise self.error(f"{text[:80]!r} is not a number") from None
+            raise self.error(f"{clipped(text)!r} is not a number") from None
         if not math.isfinite(value):
-            raise self.error(f"{text[:80]!r} is not a finite number")
+            raise self.error(f"{clipped(text)!r} is not a finite number")
         given = self.get("unit").upper()
         if unit and given and given != unit:
             known = factor(given, unit)
             if known is None:
-                raise self.error(f"unit {given[:80]!r} is not known here; it becomes {unit}")
+                raise self.error(f"unit {clipped(given)!r} is not known here; it becomes {unit}")
             value *= known
         return value
 
@@ -170,7 +170,7 @@ def read_text(data: bytes, name: str) -> Element:
             or entities > MAX_ENTITIES
         ):
             raise AircraftError(
-                f"{name}:{parser.CurrentLineNumber}: entity {entity_name[:40]!r}: only {MAX_ENTITIES} short texts without "
+                f"{name}:{parser.CurrentLineNumber}: entity {clipped(entity_name)!r}: only {MAX_ENTITIES} short texts without "
                 "references can be declared"
             )
 

@@ -34,6 +34,7 @@ from tussle.batch.tasks import BatchRun, Finished
 from tussle.batch.variables import Variable
 from tussle.batch.varied import as_variables, variable_entry
 from tussle.declare.displays import counted, line, listing, page, table
+from tussle.documents import POSITIVE, Maybe, check_argument
 from tussle.engine.simulation import Simulation
 from tussle.errors import BatchError, ParameterError, PluginError
 from tussle.mission import Loaded, Mission, PluginFile, read_mission
@@ -106,10 +107,7 @@ class Batch:
         **options: Any,
     ) -> None:
         check_source(mission, "Batch")
-        if run_timeout is not None and not 0.0 < run_timeout < math.inf:
-            raise ParameterError(
-                f"run_timeout = {run_timeout!r} is not allowed; it takes a number of seconds > 0"
-            )
+        check_argument("run_timeout", run_timeout, Maybe(POSITIVE))
         self.source = mission
         self.settings = dict(settings or {})
         self.plugin_files = tuple(PluginFile.of(p) for p in plugin_files)

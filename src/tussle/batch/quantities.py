@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from tussle.errors import ParameterError, listed, nearest_name
+from tussle.errors import ParameterError, clipped, listed, nearest_name
 
 MAX_TEXT = 200
 MAX_LISTED = 12
@@ -57,7 +57,7 @@ class Quantity:
         """
         if len(text) > MAX_TEXT:
             raise ParameterError(
-                f"quantity {text[:40]!r}... has {len(text)} characters; at most {MAX_TEXT} are allowed"
+                f"quantity {clipped(text)!r}... has {len(text)} characters; at most {MAX_TEXT} are allowed"
             )
         try:
             with warnings.catch_warnings():  # the parser has opinions about "1if"; it is refused below

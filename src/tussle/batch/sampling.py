@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from tussle.batch.statistics import scipy_package
 from tussle.batch.variables import Choice, Point, Range, Value, Variable
-from tussle.errors import ParameterError, listed, nearest_name
+from tussle.errors import ParameterError, clipped, listed, nearest_name
 
 Floats = NDArray[np.float64]
 
@@ -42,7 +42,7 @@ def method_for(variables: Sequence[Variable], method: str = "") -> str:
     if method:
         if method not in METHODS:
             raise ParameterError(
-                f"there is no sampling {method[:80]!r}{nearest_name(method[:80], METHODS)}; {listed(METHODS)}"
+                f"there is no sampling {clipped(method)!r}{nearest_name(method, METHODS)}; {listed(METHODS)}"
             )
         return method
     if all(isinstance(variable, Choice) or variable.levels is not None for variable in variables):

@@ -14,7 +14,7 @@ from tussle.batch.sampling import METHODS
 from tussle.batch.schemas import SEED
 from tussle.batch.variables import Choice, Point, Range, Variable, parse_values
 from tussle.documents import Maybe, Real, Rule, Whole, problem, read_text
-from tussle.errors import ParameterError, listed, nearest_name
+from tussle.errors import ParameterError, clipped, listed, nearest_name
 from tussle.mission.limits import Limits
 from tussle.mission.problems import MAX_LINES
 
@@ -99,7 +99,7 @@ def _read_toml(table: Mapping[str, Any], problems: list[str]) -> dict[str, Any]:
 
 def _unknown(table: Mapping[str, Any], keys: Collection[str]) -> list[str]:
     return [
-        f"{key[:80]!r} is unknown{nearest_name(key[:80], keys)}; {listed(keys)}"
+        f"{clipped(key)!r} is unknown{nearest_name(key, keys)}; {listed(keys)}"
         for key in table
         if key not in keys
     ]

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from tussle.declare.units import MAX_TEXT, QUANTITY, unit_of
-from tussle.errors import ParameterError, UnitError, listed, nearest_name
+from tussle.errors import ParameterError, UnitError, clipped, listed, nearest_name
 from tussle.mission.codecs import written
 from tussle.numeric import exp, log
 
@@ -283,7 +283,7 @@ def parse_variable(text: str) -> Variable:
     name, equals, values = (part.strip() for part in text.partition("="))
     if not equals:
         raise ParameterError(
-            f"{_cut(text)!r} is no variable; write a range such as prey_speed=20:30 or choices such as tactic=keep,switch"
+            f"{clipped(text)!r} is no variable; write a range such as prey_speed=20:30 or choices such as tactic=keep,switch"
         )
     return parse_values(name, values)
 
@@ -300,12 +300,12 @@ def parse_values(name: str, text: str) -> Variable:
     items = [item.strip() for item in text.split(",")]
     if "" in items:
         raise ParameterError(
-            f"{name}: a value is missing in {_cut(text)!r}; write a range as 20:30 or choices as keep,switch"
+            f"{name}: a value is missing in {clipped(text)!r}; write a range as 20:30 or choices as keep,switch"
         )
     for item in items:
-        if ":" in item and all(QUANTITY.fullmatch(part.strip()) for part in _cut(item).split(":")):
+        if ":" in item and all(QUANTITY.fullmatch(part.strip()) for part in clipped(item).split(":")):
             raise ParameterError(
-                f"{name}: the range {_cut(item)!r} cannot be among choices; write a range alone, as 20:30, or values, as 20,25,30"
+                f"{name}: the range {clipped(item)!r} cannot be among choices; write a range alone, as 20:30, or values, as 20,25,30"
             )
     return Choice(name, tuple(read_value(item) for item in items), is_text=True)
 
@@ -341,7 +341,7 @@ def _quantity(name: str, text: str) -> tuple[float, str]:
     if text.lower() == "nan":
         return math.nan, ""  # which Range refuses
     raise ParameterError(
-        f"{name}: {_cut(text)!r} is not a number; write a range as low:high, such as 20:30, 20:30 kt or 1e-3:10:log"
+        f"{name}: {clipped(text)!r} is not a number; write a range as low:high, such as 20:30, 20:30 kt or 1e-3:10:log"
     )
 
 
@@ -360,14 +360,10 @@ def _parse_range(name: str, parts: list[str]) -> Range:
         word = "levels" if WHOLE.fullmatch(part) else part
         if word not in (*MODIFIERS, "levels"):
             raise ParameterError(
-                f"{name}: {_cut(part)!r} behind a range is not allowed{nearest_name(_cut(part), MODIFIERS)}; "
+                f"{name}: {clipped(part)!r} behind a range is not allowed{nearest_name(part, MODIFIERS)}; "
                 "allowed are int, log and a whole number of levels"
             )
         if word in found:
             raise ParameterError(f"{name}: {word} is there twice behind the range")
         found[word] = int(part) if word == "levels" else 1
     return Range(name, low, high, "int" in found, "log" in found, found.get("levels"), unit, is_text=True)
-
-
-def _cut(text: str) -> str:
-    return text if len(text) <= 80 else text[:80] + "..."

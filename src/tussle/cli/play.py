@@ -21,7 +21,7 @@ import typer
 from tussle import documents
 from tussle.cli.interrupt import Interrupt
 from tussle.cli.options import MissionOptions
-from tussle.cli.play_options import ConvertOptions, RunOptions
+from tussle.cli.play_options import ConvertOptions, RunOptions, ViewOptions
 from tussle.cli.progress import ProgressMeter, compiling
 from tussle.cli.summary import Speed, show_summary
 from tussle.cli.tables import text_table
@@ -218,6 +218,8 @@ def run(options: RunOptions) -> int:
     with ExitStack() as stack:
         with compiling():
             simulation = stack.enter_context(simulate(loaded, mission, seed, **more))
+            if planned is not None:
+                simulation.play_inputs(planned.inputs)
             interrupt = stack.enter_context(Interrupt())
             simulation.state.context.is_interrupted = lambda: bool(interrupt.code)
             if not options.no_log:
@@ -310,7 +312,7 @@ def _new_directory(name: str, seed: int) -> Path:
 # -- runs of a batch --------------------------------------------------------------------------------------------------------
 
 
-def planned_by(options: RunOptions) -> PlannedRun:
+def planned_by(options: RunOptions | ViewOptions) -> PlannedRun:
     """Return the run of a batch that `--from DIR:417` names, or the run of a run directory.
 
     Raises:

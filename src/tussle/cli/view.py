@@ -8,7 +8,7 @@ from contextlib import ExitStack
 from typing import Any
 
 from tussle.cli.interrupt import Interrupt
-from tussle.cli.play import record, simulate
+from tussle.cli.play import planned_by, record, simulate
 from tussle.cli.play_options import PageOptions, ReplayOptions, ViewOptions
 from tussle.cli.progress import compiling
 from tussle.cli.summary import Speed, show_summary
@@ -30,7 +30,10 @@ def view(options: ViewOptions) -> int:
         PluginError: A plugin failed.
     """
     began = time.perf_counter()
-    loaded, mission, seed = options.read()
+    planned = None if options.from_batch is None else planned_by(options)
+    loaded, mission, seed = (
+        options.read() if planned is None else (planned.loaded, planned.mission, planned.seed)
+    )
     viewer = loaded.viewer
     with ExitStack() as stack:
         with compiling():
@@ -55,6 +58,7 @@ def view(options: ViewOptions) -> int:
             pace=_pace_of(viewer) if options.pace is None else options.speed,
             viewer=viewer,
             is_paused=options.paused or bool(viewer.get("start_paused", False)),
+            inputs=() if planned is None else planned.inputs,
         )
         stack.callback(live.stop)
         page = stack.enter_context(Page(live, host=options.host, port=options.port))

@@ -7,12 +7,11 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from tussle.declare import units
-from tussle.errors import ParameterError
+from tussle.errors import MAX_SHOWN, ParameterError, clipped
 
 TRUE, FALSE = ("true", "1", "yes", "on"), ("false", "0", "no", "off")
 MAX_ITEMS = 100_000
 """Maximum count of numbers in one value."""
-MAX_SHOWN = 80
 ROW = re.compile(r"\s*\[([^\[\]]*)\]")
 FRAMES = ("XYZ", "GPS")
 
@@ -22,8 +21,7 @@ Part = tuple[str, str, str]
 
 def shown(text: str, longest: int = MAX_SHOWN) -> str:
     """Quote external text for a message, on one line and shortened."""
-    flat = " ".join(text.split())
-    return repr(flat if len(flat) <= longest else flat[:longest] + "...")
+    return repr(clipped(" ".join(text.split()), longest))
 
 
 def truth(text: str) -> bool:

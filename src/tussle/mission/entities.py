@@ -316,7 +316,8 @@ class EntityReader:
             written = PluginTag.of(fields.found["motion_model"])
             if fields.has("script_name"):
                 self._add_script(fields, written)
-            return self.plugins.make(written, taken)
+            is_moving = any(fields.vector("vx", "vy", "vz")) or fields.number("speed") != 0.0
+            return self.plugins.faster(self.plugins.make(written, taken), written, is_moving)
         default = PluginTag("motion_model", ENTITY["motion_model"].default, {}, lambda _: fields.node.place)
         return self.plugins.make(default, taken)
 

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 from tussle.api.plugin import RESERVED, Plugin
 from tussle.declare.columns import Param
 from tussle.declare.texts import shown
-from tussle.errors import ParameterError, TussleError, listed, nearest_name
+from tussle.errors import ParameterError, TussleError, clipped, listed, nearest_name
 from tussle.mission.spec import BLOCK_VALUES, MISSION_VALUES, RUN, Block, Mission
 
 
@@ -54,7 +54,7 @@ def resolve(
 
 def _absent(path: str, owner: str, name: str, known: Collection[str]) -> ParameterError:
     return ParameterError(
-        f"{shown(path)}: {owner[:80]} has no {name[:80]!r}{nearest_name(name[:80], known)}; {listed(known)}"
+        f"{shown(path)}: {clipped(owner)} has no {clipped(name)!r}{nearest_name(name, known)}; {listed(known)}"
     )
 
 

@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterable
 from itertools import islice
 from typing import NamedTuple
 
-from tussle.declare.texts import MAX_SHOWN, shown
+from tussle.declare.texts import shown
 from tussle.errors import MissionError, listed, nearest_name
 
 MAX_LINES = 100
@@ -73,7 +73,7 @@ class Problems:
         if (what, name) not in self._absent:
             some = list(islice(known, MAX_GUESSED))
             more = ", ..." if len(known) > len(some) else ""
-            guess = nearest_name(name[:MAX_SHOWN], some)
+            guess = nearest_name(name, some)
             self._absent[what, name] = f"there is no {what} {shown(name)}{guess}; {listed(some)}{more}"
         self.error(place, self._absent[what, name])
 
@@ -93,7 +93,7 @@ class Problems:
             return
         if (what, name) not in self._unknown:
             known = sorted(allowed)
-            text = f"{what} {shown(name)} is unknown{nearest_name(name[:MAX_SHOWN], known)}"
+            text = f"{what} {shown(name)} is unknown{nearest_name(name, known)}"
             self._unknown[what, name] = text, listed(known)
         text, allowed_names = self._unknown[what, name]
         if self.strictness.is_strict or not place.line:

@@ -9,6 +9,8 @@ from __future__ import annotations
 import re
 from typing import NamedTuple
 
+from tussle.errors import clipped
+
 OPENING = re.compile(r"""<([^\s<>/!?]++)(?:[^"'<>]++|"[^"<]*+"|'[^'<]*+')*+>""")
 CLOSING = re.compile(r"</([^\s<>]++)\s*+>")
 AMPERSAND = re.compile(r"&(?!(?:lt|gt|amp|quot|apos|#\d{1,7}|#x[0-9A-Fa-f]{1,6});)")
@@ -102,7 +104,7 @@ class _Repairer:
         if name == match[1]:
             self.copy(match.end())
         else:
-            why = f"<{name[:80]}> is closed by </{match[1][:80]}>"
+            why = f"<{clipped(name)}> is closed by </{clipped(match[1])}>"
             self.copy(match.end(), match[0].replace(match[1], name, 1), why)
         return True
 

@@ -24,6 +24,9 @@ from tussle.record.schema import (
     EVENTS_FILE,
     EVENTS_RULES,
     FILES,
+    INPUTS,
+    INPUTS_FILE,
+    INPUTS_RULES,
     LINKS,
     LINKS_FILE,
     LINKS_RULES,
@@ -79,6 +82,7 @@ class Run:
         self.events_table = self._read_table(EVENTS_FILE, EVENTS, EVENTS_RULES, False)
         self.shapes_table = self._read_if_written(SHAPES_FILE, SHAPES, SHAPES_RULES, is_mapped)
         self.results_table = self._read_if_written(RESULTS_FILE, RESULTS, RESULTS_RULES, False)
+        self.inputs_table = self._read_if_written(INPUTS_FILE, INPUTS, INPUTS_RULES, False)
         self.links_table = self._read_if_written(LINKS_FILE, LINKS, LINKS_RULES, False)
 
     def _read_if_written(self, name: str, schema: pa.Schema, rules: Rules, is_mapped: bool) -> pa.Table:
@@ -150,6 +154,11 @@ class Run:
     def results(self) -> Any:
         """Scores and results, one row for each change, as a frame; empty unless they were recorded."""
         return self._frame(self.results_table)
+
+    @cached_property
+    def inputs(self) -> Any:
+        """Messages and columns that came from outside, as a frame."""
+        return self._frame(self.inputs_table)
 
     @cached_property
     def links(self) -> Any:

@@ -461,7 +461,10 @@ class Recording:
             return None
         try:
             loaded = read_mission(
-                path.resolve(), strict=False, plugin_files=self._plugin_files or self._own_plugins()
+                path.resolve(),
+                strict=False,
+                plugin_files=self._plugin_files or self._own_plugins(),
+                plays=False,
             )
             self.notes.extend(note for note in loaded.notes if "<terrain>" in note)
             return loaded

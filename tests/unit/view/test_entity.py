@@ -142,9 +142,9 @@ def test_what_the_world_says_is_heard_by_all():
     sim = Simulation(clickable(), seeds=[1, 2])
     sim.publish(WorldPointClicked, [1], pos=(1.0, 2.0, 3.0))
     sim.step()
-    assert entity_state(sim, 0, 1).heard == []
-    (message,) = entity_state(sim, 1, 1).heard
+    assert entity_state(sim, 0, 1).received == []
+    (message,) = entity_state(sim, 1, 1).received
     assert (message.topic, message.sender) == ("GlobalNetwork/WorldPointClicked", 0)
     assert message.fields["pos"].tolist() == [1.0, 2.0, 3.0]
     sim.step()
-    assert entity_state(sim, 1, 1).heard == []
+    assert entity_state(sim, 1, 1).received == []

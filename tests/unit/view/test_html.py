@@ -108,7 +108,7 @@ def test_times_that_are_a_whole_number_of_periods_are_kept_in_spite_of_rounding(
 
 @pytest.mark.parametrize("period", [0.0, -1.0, math.nan, math.inf])
 def test_a_period_is_a_number_of_seconds(hunted, tmp_path, period):
-    with pytest.raises(ParameterError, match="seconds > 0"):
+    with pytest.raises(ParameterError, match="a number > 0"):
         write_html(Recording(hunted), tmp_path / "page.html", period=period)
 
 

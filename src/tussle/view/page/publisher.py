@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from tussle.documents import Real
 from tussle.errors import ParameterError
 from tussle.pacing import POLL_PERIOD
 from tussle.record.run_file import mission_entry
@@ -19,7 +20,7 @@ from tussle.view.curves import numbers_of
 from tussle.view.frame import Event, Frame
 from tussle.view.live import Live
 from tussle.view.page.chunks import FULL_HEALTH, UNIT, pack, step_of
-from tussle.view.page.commands import MAX_ID, WANTED, Command, game_commands, number, read_command, whole
+from tussle.view.page.commands import ID, MAX_ID, WANTED, Command, game_commands, read_command
 from tussle.view.page.document import event_rows
 from tussle.view.page.drawing import drawing_message
 from tussle.view.page.facts import mission_facts
@@ -287,10 +288,10 @@ class FramePublisher:
     def _take(self, reader: Reader, text: Any) -> None:
         """Execute the command of a browser; ignore invalid ones."""
         commands = self._commands | {
-            "choose": Command(reader.choose, {"id": whole(0, MAX_ID)}, steers=False),
+            "choose": Command(reader.choose, {"id": ID}, steers=False),
             "want": Command(lambda wanted: self._want(reader, wanted), {"wanted": WANTED}, steers=False),
             "history": Command(
-                lambda seconds: self._look_back(reader, seconds), {"seconds": number(0.0, 1e9)}, steers=False
+                lambda seconds: self._look_back(reader, seconds), {"seconds": Real(0.0, 1e9)}, steers=False
             ),
         }
         with self._failures.caught():

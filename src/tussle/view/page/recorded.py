@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import struct
 from collections.abc import Sequence
 from functools import cached_property
@@ -12,7 +11,8 @@ from typing import Any
 import numpy as np
 
 from tussle.declare import displays
-from tussle.errors import ParameterError, ViewError
+from tussle.documents import POSITIVE, Maybe, check_argument
+from tussle.errors import ViewError
 from tussle.mission import Mission
 from tussle.view.page.chunks import ANGLE_ERROR, FULL_HEALTH, UNIT, pack, position_error, step_of
 from tussle.view.page.compare import Comparison
@@ -65,8 +65,7 @@ class RecordedData:
         mission: Mission | None = None,
         viewer: dict[str, Any] | None = None,
     ) -> None:
-        if period is not None and not 0.0 < period < math.inf:
-            raise ParameterError(f"period = {period!r} is not allowed; it takes a number of seconds > 0")
+        check_argument("period", period, Maybe(POSITIVE))
         self._game, self._period, self._is_file = game, period, is_file
         self.kept = kept_frames(game.t, period)
         if not len(self.kept):

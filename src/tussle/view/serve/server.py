@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any, Self, TypeVar
 
+from tussle.documents import Whole, check_argument
 from tussle.engine.simulation import Simulation
 from tussle.errors import MissingExtraError, ParameterError, TussleError, listed, nearest_name
 from tussle.pacing import Pace
@@ -33,6 +34,7 @@ MAX_SUBSCRIPTIONS = 64
 """Largest number of subscriptions of a client."""
 SLICE = 0.05
 """Longest run of steps before other commands are executed [s]."""
+COUNT = Whole(1, 10**9)
 OWN_COMMANDS = ("pause", "play", "step", "subscribe", "unsubscribe")
 
 
@@ -221,7 +223,7 @@ class Server:
             raise ParameterError(
                 f"a client has 1 to {MAX_SUBSCRIPTIONS} subscriptions, each of at least one path"
             )
-        _check_count("every", every)
+        check_argument("every", every, COUNT)
         if encoding not in ENCODINGS:
             raise ParameterError(f"encoding = {encoding!r} is not allowed; {listed(ENCODINGS)}")
         for path in wanted:
@@ -233,7 +235,7 @@ class Server:
     # -- steps ------------------------------------------------------------------------------------------------------------------------
 
     async def _step(self, n: int) -> dict[str, Any]:
-        _check_count("n", n)
+        check_argument("n", n, COUNT)
         while n > 0 and not self._simulation.is_over:
             n -= await self._turned(partial(self._advance, n))
         return self._session.now()
@@ -282,13 +284,6 @@ class Server:
                     client.offer({"error": str(error)})
             if simulation.is_over:
                 self._can_play.clear()
-
-
-def _check_count(name: str, value: Any) -> None:
-    if type(value) is not int or not 1 <= value <= 10**9:
-        raise ParameterError(
-            f"{name} = {value!r} is not allowed; it takes a whole number from 1 to 1000000000"
-        )
 
 
 def _known(command: str, fields: Mapping[str, Any], **defaults: Any) -> dict[str, Any]:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from tussle.documents import read_bytes
-from tussle.errors import MissingExtraError, ParameterError, listed, nearest_name
+from tussle.errors import MissingExtraError, ParameterError, clipped, listed, nearest_name
 from tussle.world.rays.grids import read_ascii_grid, read_image
 from tussle.world.rays.surfaces import MAX_FACES, HeightField, TriangleMesh
 from tussle.world.rays.textures import decoded
@@ -147,5 +147,5 @@ def _by_trimesh(path: Path, data: bytes) -> tuple[np.ndarray, np.ndarray]:
         raise
     except Exception as error:
         raise ParameterError(
-            f"{path}: it cannot be read as {suffix}: {type(error).__name__}: {str(error)[:200]}"
+            f"{path}: it cannot be read as {suffix}: {type(error).__name__}: {clipped(str(error), 200)}"
         ) from error

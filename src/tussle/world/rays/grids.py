@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from tussle.errors import MissingExtraError, ParameterError, listed, nearest_name
+from tussle.errors import MissingExtraError, ParameterError, clipped, listed, nearest_name
 from tussle.world.rays.surfaces import MAX_HEIGHTS, HeightField
 
 KEYS = ("ncols", "nrows", "xllcorner", "yllcorner", "xllcenter", "yllcenter", "cellsize", "nodata_value")
@@ -60,7 +60,7 @@ def _read_head(path: Path, lines: list[str]) -> tuple[dict[str, float], int]:
         key = words[0].lower()
         if key not in KEYS:
             raise ParameterError(
-                f"{path}:{number}: a terrain has no {words[0][:40]!r}{nearest_name(key, KEYS)}; {listed(KEYS)}"
+                f"{path}:{number}: a terrain has no {clipped(words[0])!r}{nearest_name(key, KEYS)}; {listed(KEYS)}"
             )
         try:
             (head[key],) = (float(word) for word in words[1:])

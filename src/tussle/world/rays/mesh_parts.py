@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from tussle.errors import ParameterError, TussleError
+from tussle.errors import ParameterError, TussleError, clipped
 from tussle.world.rays.files import BY_TRIMESH, bytes_of, corners
 from tussle.world.rays.surfaces import MeshPart
 from tussle.world.rays.textures import decoded, reduced
@@ -52,7 +52,7 @@ def read_parts(
         raise
     except Exception as error:  # readers of damaged data raise errors of many kinds
         raise ParameterError(
-            f"{path}: its colours cannot be read: {type(error).__name__}: {str(error)[:200]}"
+            f"{path}: its colours cannot be read: {type(error).__name__}: {clipped(str(error), 200)}"
         ) from error
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from tussle.errors import MissingExtraError, ParameterError
+from tussle.errors import MissingExtraError, ParameterError, clipped
 
 MAX_PIXELS = 32_000_000
 """Pixels of an image that is decoded: 128 MB."""
@@ -39,7 +39,7 @@ def decoded(where: str, data: bytes) -> np.ndarray:
         raise
     except Exception as error:  # decoders of damaged data raise errors of many kinds
         raise ParameterError(
-            f"{where}: it is no PNG, JPEG or TIFF that can be read: {str(error)[:200]}"
+            f"{where}: it is no PNG, JPEG or TIFF that can be read: {clipped(str(error), 200)}"
         ) from error
 
 
@@ -58,7 +58,7 @@ def reduced(where: str, image: Any) -> np.ndarray:
         image.thumbnail((MAX_SIDE, MAX_SIDE))
         return np.asarray(image.convert("RGB"))
     except Exception as error:  # decoders of damaged data raise errors of many kinds
-        raise ParameterError(f"{where}: the image cannot be read: {str(error)[:200]}") from error
+        raise ParameterError(f"{where}: the image cannot be read: {clipped(str(error), 200)}") from error
 
 
 def jpeg(pixels: np.ndarray) -> bytes:

@@ -9,7 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from tussle.errors import ParameterError, listed
+from tussle.errors import ParameterError, clipped, listed
 from tussle.world.rays.surfaces import MAX_FACES
 
 TYPES = {"float": ">f4", "double": ">f8", "int": ">i4", "long": ">i8", "vtktypeint64": ">i8"}
@@ -83,7 +83,7 @@ def read_vtk(data: bytes) -> tuple[np.ndarray, np.ndarray]:
                     faces.append(_triangles(start, corners, words[0]))
             elif words[0] not in ("METADATA", "INFORMATION", "NAME", "DATA"):
                 raise ParameterError(
-                    f"the part {words[0][:40]!r} is not known; {listed(('POINTS', *CELLS, *SKIPPED))}"
+                    f"the part {clipped(words[0])!r} is not known; {listed(('POINTS', *CELLS, *SKIPPED))}"
                 )
     except (ValueError, IndexError, KeyError, OverflowError) as error:
         if isinstance(error, ParameterError):

@@ -11,7 +11,7 @@ import numpy as np
 
 from tussle.api import Interaction, Param, WorldView
 from tussle.declare.messages import Messages, TextMessage
-from tussle.errors import ParameterError, listed, nearest_name
+from tussle.errors import ParameterError, clipped, listed, nearest_name
 from tussle.plugins.links.rpc import COMMANDS, SEND_COMMAND, load_grpc, message_types
 
 MAX_WAITING = 10_000
@@ -111,14 +111,14 @@ class CommandServer:
             if not 0 < to <= self.last_id:
                 call.abort(
                     self._status.INVALID_ARGUMENT,
-                    f"topic {command.topic[:80]!r}: no entity has had the id {to}; ids are 1 to {self.last_id}",
+                    f"topic {clipped(command.topic)!r}: no entity has had the id {to}; ids are 1 to {self.last_id}",
                 )
         if (network, topic) not in self._subscribed:
             names = [" ".join(each) for each in self._subscribed]
             near = nearest_name(f"{network} {topic}", names)
             call.abort(
                 self._status.INVALID_ARGUMENT,
-                f"no plugin listens to texts on network {network[:80]!r}, topic {topic[:80]!r}{near}; {listed(names)}",
+                f"no plugin listens to texts on network {clipped(network)!r}, topic {clipped(topic)!r}{near}; {listed(names)}",
             )
         if len(self.waiting) >= MAX_WAITING:
             call.abort(self._status.RESOURCE_EXHAUSTED, f"{MAX_WAITING} commands wait for the next step")
