@@ -338,8 +338,5 @@ def settle(out, was_alive):
     return -1
 
 
-SETTLE = {
-    np.dtype(dtype): kernel(f"{code} B -> i8")(settle)
-    for dtype, code in ((np.float32, "Sw"), (np.float64, "Fw"))
-}
+SETTLE = {"float32": kernel("Sw B -> i8")(settle), "float64": kernel("Fw B -> i8")(settle)}
 """`settle` by type of the numbers."""

@@ -284,7 +284,7 @@ class Term:
                 "for each world, such as values[:, None]"
             )
         np.multiply(values, self.weight, out=out, casting="same_kind")
-        wrong = int(SETTLE[out.dtype](out.reshape(-1), now.was_alive.reshape(-1)))
+        wrong = int(SETTLE[out.dtype.name](out.reshape(-1), now.was_alive.reshape(-1)))
         if wrong >= 0:
             world, agent = divmod(wrong, agents)
             raise ParameterError(
