@@ -10,13 +10,19 @@ import numpy as np
 
 from tussle.api.bodies import DERIVED, FLOATS
 from tussle.errors import ParameterError, listed, nearest_name
+from tussle.numeric.kernel import kernel
 from tussle.record.events import CAPTURE, COLLISION, DEATH, FLAG
-from tussle.rl.kernels import SETTLE, take
+from tussle.rl import kernels
 from tussle.rl.observation import TEAMS, AgentRows, Component, Means, NearestOthers, block_numbers
 
 if TYPE_CHECKING:
     from tussle.engine.simulation import Simulation
 
+SETTLE = {
+    np.dtype(dtype): kernel(f"{code} B -> i8")(kernels.settle)
+    for dtype, code in ((np.float32, "Sw"), (np.float64, "Fw"))
+}
+"""The kernel that ends a term, by type of the numbers."""
 SHARES = ("agent", "team", "world")
 COUNTED = (CAPTURE, COLLISION, DEATH, FLAG)
 """Kinds of events that a situation counts."""
@@ -88,7 +94,7 @@ class Situation:
             source = bodies.derived(name) if name in DERIVED else getattr(bodies, name)
             table = np.atleast_2d(source)
             out = np.zeros((self.alive.size, len(table)))
-            take(np.ascontiguousarray(table, float), self.rows, self.agents, out)
+            kernels.take(np.ascontiguousarray(table, float), self.rows, self.agents, out)
             self._columns[name] = out.reshape(*self.alive.shape, *source.shape[:-1])
         return self._columns[name]  # type: ignore[no-any-return]
 
