@@ -339,6 +339,10 @@ def settle(out, was_alive):
     return -1
 
 
+SETTLE = {"float32": kernel("Sw B -> i8")(settle), "float64": kernel("Fw B -> i8")(settle)}
+"""`settle` by type of the numbers."""
+
+
 # -- searches that start from a guess ------------------------------------------------------------------------------------------------
 
 GUESS = 1.1

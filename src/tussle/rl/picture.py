@@ -11,9 +11,9 @@ from tussle.engine.simulation import Simulation
 from tussle.view.export.film.cameras import (
     AZIMUTH,
     ELEVATION,
-    LARGEST,
     MARGIN,
-    SMALLEST,
+    MAX_SIZE,
+    MIN_SIZE,
     UP,
     VIEW_ANGLE,
     View,
@@ -59,7 +59,7 @@ class WorldCamera:
         half = max(0.5 * float(np.linalg.norm(high - low)) / MARGIN, MIN_HALF)
         middle, seen = 0.5 * (low + high), 2.0 * half * self._aspect
         spacing = seen / math.sqrt(len(pos) + 1.0)
-        length = float(np.clip(spacing, SMALLEST * seen, LARGEST * seen))
+        length = float(np.clip(spacing, MIN_SIZE * seen, MAX_SIZE * seen))
         eye = middle + self._back * half / math.tan(0.5 * VIEW_ANGLE)
         self._renderer.show(frame, View(eye, middle, UP, half, model_length=length))
         return self._renderer.picture()

@@ -10,7 +10,6 @@ import numpy as np
 
 from tussle.api.bodies import DERIVED, FLOATS
 from tussle.errors import ParameterError, listed, nearest_name
-from tussle.numeric.kernel import kernel
 from tussle.record.events import CAPTURE, COLLISION, DEATH, FLAG
 from tussle.rl import kernels
 from tussle.rl.observation import TEAMS, AgentRows, Component, Means, NearestOthers, block_numbers
@@ -18,11 +17,6 @@ from tussle.rl.observation import TEAMS, AgentRows, Component, Means, NearestOth
 if TYPE_CHECKING:
     from tussle.engine.simulation import Simulation
 
-SETTLE = {
-    np.dtype(dtype): kernel(f"{code} B -> i8")(kernels.settle)
-    for dtype, code in ((np.float32, "Sw"), (np.float64, "Fw"))
-}
-"""The kernel that ends a term, by type of the numbers."""
 SHARES = ("agent", "team", "world")
 COUNTED = (CAPTURE, COLLISION, DEATH, FLAG)
 """Kinds of events that a situation counts."""
@@ -290,7 +284,7 @@ class Term:
                 "for each world, such as values[:, None]"
             )
         np.multiply(values, self.weight, out=out, casting="same_kind")
-        wrong = int(SETTLE[out.dtype](out.reshape(-1), now.was_alive.reshape(-1)))
+        wrong = int(kernels.SETTLE[out.dtype.name](out.reshape(-1), now.was_alive.reshape(-1)))
         if wrong >= 0:
             world, agent = divmod(wrong, agents)
             raise ParameterError(

@@ -14,7 +14,7 @@ from tussle.documents import read_text
 from tussle.errors import ParameterError, listed, nearest_name
 
 CRITICS = ("own", "central")
-MOST_TEXT = 2**20
+MAX_TEXT = 2**20
 """Largest file of settings, in bytes."""
 
 
@@ -112,7 +112,7 @@ def read_training(path: Path) -> dict[str, Any]:
         ParameterError: It cannot be read, or is not TOML.
     """
     try:
-        return tomllib.loads(read_text(path, ParameterError, MOST_TEXT).removeprefix("\ufeff"))
+        return tomllib.loads(read_text(path, ParameterError, MAX_TEXT).removeprefix("\ufeff"))
     except tomllib.TOMLDecodeError as error:
         raise ParameterError(f"{path}: this is not TOML: {error}") from None
     except RecursionError:

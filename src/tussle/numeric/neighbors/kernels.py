@@ -220,7 +220,7 @@ def query_positions(queries, points, out, part):
         out[2, k] = points[2, p]
 
 
-FINE, MOST_FINE = 64.0, float(1 << 29)
+FINE, MAX_FINE = 64.0, float(1 << 29)
 """Queries of a strip are ordered by the 64ths of a cell that they lie in, up to so many from the origin."""
 
 
@@ -241,7 +241,7 @@ def group_queries(index, inverse_cell, first, last, x, cuts):
         for p in range(strip_start[strip], strip_start[strip + 1]):
             row = order[p]
             if done < last - first:
-                queries[done] = (cell_of(x[p], inverse, MOST_FINE) << 32) | p
+                queries[done] = (cell_of(x[p], inverse, MAX_FINE) << 32) | p
             done += (row >= first) & (row < last)
         if inverse != 0.0:
             sort_keys(queries, scratch, begin, done)

@@ -11,7 +11,7 @@ from tussle.errors import TussleError
 
 MAX_FAILURES = 20
 """Largest number of listed failures."""
-LONGEST = 300
+MAX_TEXT = 300
 """Characters of one."""
 
 
@@ -50,5 +50,5 @@ def _in_words(error: BaseException) -> str:
     if not isinstance(error, TussleError):
         places = traceback.extract_tb(error.__traceback__)
         where = f" ({Path(places[-1].filename).name}:{places[-1].lineno})" if places else ""
-        text = f"the page: {type(error).__name__}: {text[: LONGEST - 100]}{where}"
-    return text[:LONGEST]
+        text = f"the page: {type(error).__name__}: {text[: MAX_TEXT - 100]}{where}"
+    return text[:MAX_TEXT]

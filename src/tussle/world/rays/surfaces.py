@@ -13,7 +13,7 @@ from tussle.numeric.arrays import unit
 
 MAX_HEIGHTS = 4_000_000
 MAX_FACES = 2_000_000
-FARTHEST = 1e9
+MAX_COORDINATE = 1e9
 """Largest coordinate of a surface [m]: positions there are still good to a micrometre."""
 TECHNIQUES = ("RANDOM_WALK", "LINEAR", "LINEAR_WALK")
 
@@ -250,10 +250,10 @@ class TriangleMesh:
 
 
 def _check_coordinates(name: str, values: np.ndarray) -> None:
-    wrong = ~(np.abs(values) <= FARTHEST)
+    wrong = ~(np.abs(values) <= MAX_COORDINATE)
     if wrong.any():
         raise ParameterError(
-            f"{name} has the coordinate {values[wrong].flat[0]!r}; coordinates are numbers within +-{FARTHEST:g} m"
+            f"{name} has the coordinate {values[wrong].flat[0]!r}; coordinates are numbers within +-{MAX_COORDINATE:g} m"
         )
 
 
