@@ -346,7 +346,7 @@ SETTLE = {"float32": kernel("Sw B -> i8")(settle), "float64": kernel("Fw B -> i8
 # -- searches that start from a guess ------------------------------------------------------------------------------------------------
 
 GUESS = 1.1
-"""Distance of the next search over that of the last k-th other, and its factor while too few are found: 1.5."""
+"""Distance of the next search over that of the last k-th other."""
 MAX_RANKED = 48
 """Candidates that are compared all with all, instead of inserted one after another."""
 
@@ -435,9 +435,12 @@ def find_from_guess(floats, who, places, arrays, numbers, guesses, part, near):
         mask = (1 << shift) - 1
         reach = min(guesses[a], radius)
         n = scan_world(me, x, y, z, reach, mode, wanted[i], table, start, end, other)
-        while n < k and reach < radius:
-            reach = min(1.5 * reach if reach < 1e150 else np.inf, radius)
-            n = scan_world(me, x, y, z, reach, mode, wanted[i], table, start, end, other)
+        for reach in (
+            1.5 * reach,
+            radius,
+        ):  # the last guess of those without k others is infinite: one search finds that again
+            if n < k and guesses[a] < radius:
+                n = scan_world(me, x, y, z, min(reach, radius), mode, wanted[i], table, start, end, other)
         for j in range(n):
             q = np.uint64(other[j])
             dx, dy, dz = x - sx[q], y - sy[q], z - sz[q]
@@ -449,8 +452,7 @@ def find_from_guess(floats, who, places, arrays, numbers, guesses, part, near):
         sort_keys(squares, other, n, k, ranks, sorted_keys, sorted_rows)
         for j in range(k):
             near[i, j] = sorted_rows[j] if j < n else -1
-        if n >= k:
-            guesses[a] = GUESS * math.sqrt(sorted_keys[k - 1]) + 1e-3
+        guesses[a] = GUESS * math.sqrt(sorted_keys[k - 1]) + 1e-3 if n >= k else np.inf
 
 
 # -- particles ------------------------------------------------------------------------------------------------------------------------

@@ -43,6 +43,10 @@ def test_any_guess_gives_the_nearest(n, mode, radius):
 
         near = shared.nearest(bodies, None, (rows, rows, team), places, arrays, (k, mode, radius), split)
         np.testing.assert_array_equal(near, by_hand)
+        again = shared._guesses[None, radius]
+        np.testing.assert_array_equal(
+            np.isinf(again), n_found < k
+        )  # one search next time, where there are too few
 
 
 @pytest.mark.parametrize("which", [Formation, Battle])
