@@ -435,12 +435,11 @@ def find_from_guess(floats, who, places, arrays, numbers, guesses, part, near):
         mask = (1 << shift) - 1
         reach = min(guesses[a], radius)
         n = scan_world(me, x, y, z, reach, mode, wanted[i], table, start, end, other)
-        for reach in (
-            1.5 * reach,
-            radius,
-        ):  # the last guess of those without k others is infinite: one search finds that again
+        further = 1.5 * reach
+        for _ in range(2):  # the guess of those without k others is infinite: one search finds that again
             if n < k and guesses[a] < radius:
-                n = scan_world(me, x, y, z, min(reach, radius), mode, wanted[i], table, start, end, other)
+                n = scan_world(me, x, y, z, min(further, radius), mode, wanted[i], table, start, end, other)
+            further = radius
         for j in range(n):
             q = np.uint64(other[j])
             dx, dy, dz = x - sx[q], y - sy[q], z - sz[q]
