@@ -161,9 +161,11 @@ def test_a_branch_is_the_same_game_up_to_its_step_and_then_has_other_luck():
     assert draws_of(own)[1] == [branched]
     unlike = Simulation(game, [1])
     unlike.observers.append(
-        lambda s: np.testing.assert_array_equal(s.read("late.pos")[0], states[int(s.steps[0])])
-        if s.steps[0] <= 4
-        else None
+        lambda s: (
+            np.testing.assert_array_equal(s.read("late.pos")[0], states[int(s.steps[0])])
+            if s.steps[0] <= 4
+            else None
+        )
     )
     unlike.run()  # also what is born in step 4 is the same
     stack.reset([1])
@@ -179,7 +181,9 @@ def test_rekeys_of_a_mission_file(tmp_path):
     assert "rekeys=((4, 7)" in to_python(game)
 
 
-@pytest.mark.parametrize("text", ["", "4", "4:7 4:8", "9:1 4:1", "-1:3", "4:18446744073709551616", "4294967296:1"])
+@pytest.mark.parametrize(
+    "text", ["", "4", "4:7 4:8", "9:1 4:1", "-1:3", "4:18446744073709551616", "4294967296:1"]
+)
 def test_rekeys_that_are_none(text, tmp_path):
     with pytest.raises(MissionError, match="pairs of a step and a key"):
         read(tmp_path, f' rekeys="{text}"')
