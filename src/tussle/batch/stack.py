@@ -245,7 +245,7 @@ class _Stack:
         return Finished(
             run.number, result.end, result.t, result.steps,
             None if result.error else result.winner, result.state_hash, "" if result.error is None else _reported(result.error),
-            self._cpu.total - float(self._cpu_begun[world]), self._host, _metrics(result), alive, seen,
+            self._cpu.total - float(self._cpu_begun[world]), self._host, metrics_of(result), alive, seen,
         )  # fmt: skip
 
 
@@ -254,7 +254,7 @@ def _by_path(runs: Sequence[BatchRun]) -> dict[str, list[Any]]:
     return {path: [run.params[path] for run in runs] for path in runs[0].params}
 
 
-def _metrics(result: WorldResult) -> list[tuple[int | None, str, float]]:
+def metrics_of(result: WorldResult) -> list[tuple[int | None, str, float]]:
     """All metrics of a run, of teams and of the world."""
     out: list[tuple[int | None, str, float]] = []
     for name, counts in (("score", result.scores), ("alive", result.alive), ("start", result.born)):
