@@ -1,7 +1,8 @@
 """Compiles the kernels of the missions that ship, which a wheel brings along, so that the first game begins at once.
 
-They are compiled for each level of processor in TUSSLE_WHEEL_LEVELS, by default that of this processor, and fit the versions of Python,
-NumPy and Numba that compile them. With other versions, and for other missions, kernels are compiled on the first run, as without them.
+They are compiled for each level of processor in TUSSLE_WHEEL_LEVELS that this processor can run, by default its own, and fit the
+versions of Python, NumPy and Numba that compile them. With other versions, and for other missions, kernels are compiled on the first run,
+as without them.
 TUSSLE_WHEEL_LEVELS= (empty) leaves them out.
 """
 
@@ -20,10 +21,12 @@ from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 LEVELS = "TUSSLE_WHEEL_LEVELS"
 MISSIONS = ("predator_prey",)
 """Those of the first hour. Each further one makes the installation from source longer."""
-OWN_LEVEL = "from tussle.numeric import processor; print(processor.level())"
+OWN_LEVELS = "from tussle.numeric import processor; print(*processor.levels())"
 PLAY = """
 import sys
 from tussle import Simulation
+from tussle.numeric import processor
+processor.choose(sys.argv[2])
 from tussle.mission.xml import read_mission
 Simulation(read_mission(sys.argv[1]).mission).run()
 """
@@ -38,10 +41,15 @@ class KernelsHook(BuildHookInterface):
             return
         self._folder = Path(tempfile.mkdtemp(prefix="tussle-kernels-"))
         try:
-            levels = os.environ[LEVELS] if LEVELS in os.environ else self._python(OWN_LEVEL)
-            for level in levels.split():
+            own = self._python(OWN_LEVELS).split()
+            for level in os.environ[LEVELS].split() if LEVELS in os.environ else own[:1]:
+                if level not in own:
+                    self.app.display_warning(
+                        f"the wheel brings no kernels for {level} along, which this processor cannot run"
+                    )
+                    continue
                 for mission in MISSIONS:
-                    self._python(PLAY, mission, level=level)
+                    self._python(PLAY, mission, level)
         except RuntimeError as error:
             self.app.display_warning(f"the wheel brings no kernels along: {error}")
             return
@@ -55,7 +63,7 @@ class KernelsHook(BuildHookInterface):
         if folder := getattr(self, "_folder", None):
             shutil.rmtree(folder)
 
-    def _python(self, code: str, *arguments: str, level: str = "") -> str:
+    def _python(self, code: str, *arguments: str) -> str:
         """Run code with the package of the source tree; returns what it prints.
 
         Raises:
@@ -73,8 +81,6 @@ class KernelsHook(BuildHookInterface):
             *arguments,
         ]
         env = {**os.environ, "TUSSLE_CACHE_DIR": str(self._folder)}
-        if level:
-            env |= {"NUMBA_CPU_NAME": level, "NUMBA_CPU_FEATURES": ""}
         done = subprocess.run(command, env=env, capture_output=True, text=True, check=False)
         if done.returncode:
             raise RuntimeError(done.stderr[-2000:])

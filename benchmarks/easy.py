@@ -142,7 +142,7 @@ def measure(behaviour: type[EasyAutonomy], n: int) -> dict[str, Any]:
     spent: list[float] = []
     sim = Simulation(mission(n, behaviour()))
     sim.step(3)
-    calls = sim.schedule
+    calls = sim.schedule.calls
     for i, call in enumerate(calls):
         if behaviour.__name__ in call.label:
             calls[i] = Call(call.label, _timed(call.run, spent))

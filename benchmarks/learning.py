@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from tag import Tag
 
 from tussle import Block, Mission, Simulation
 from tussle.mission import read_mission
@@ -25,6 +24,7 @@ from tussle.rl import (
     Own,
     PredatorPrey,
     PredatorTeam,
+    SimpleTag,
     Swarm,
     Task,
     Term,
@@ -207,7 +207,7 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=3.0)
     parser.add_argument("--json", type=Path)
     options = parser.parse_args()
-    tag, s = Tag(time_limit=10.0), options.seconds
+    tag, s = SimpleTag(time_limit=10.0), options.seconds
     shipped = [registered_task(f"tussle/{name}-v0", "the benchmark") for name in SHIPPED]
     rows = {
         "prey, make_swarm": swarm_case(Prey, 64, s),

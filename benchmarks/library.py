@@ -30,7 +30,7 @@ from tussle.plugins import stock
 from tussle.testing.partners import driver
 
 SIZES = (1_000, 10_000)
-LEAST_CPU = 0.1
+MIN_CPU = 0.1
 """Smallest CPU time of a measurement [s]."""
 LIMIT, LIMIT_SIX_DEGREES = 300.0, 1000.0
 """Wanted [ns]."""
@@ -112,7 +112,7 @@ def measure(motion: Any, controller: Any, n: int) -> dict[str, Any]:
             for call in calls:
                 call()
         cpu = time.process_time() - begin
-        if cpu >= LEAST_CPU:
+        if cpu >= MIN_CPU:
             break
     return row | {"ns_per_substep": 1e9 * cpu / (times * n)}
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from tussle import Mission, Simulation
 
-LEAST_CPU = 2.0
+MIN_CPU = 2.0
 """Smallest CPU time of a measurement [s]."""
 
 
@@ -30,14 +30,14 @@ def arguments(description: str, sizes: Sequence[int], **choices: Sequence[str]) 
 
 
 def play(make: Callable[[], Simulation]) -> tuple[float, float, int, Simulation]:
-    """Play whole simulations until LEAST_CPU is reached.
+    """Play whole simulations until MIN_CPU is reached.
 
     Returns:
         CPU seconds of stepping, simulated seconds (of all worlds together), agent-steps, the last simulation.
     """
     cpu = simulated = 0.0
     agent_steps = 0
-    while cpu < LEAST_CPU:
+    while cpu < MIN_CPU:
         sim = make()
         while not sim.is_over:
             n, k = sim.state.population.bodies.n, int(sim.steps.sum())

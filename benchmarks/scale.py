@@ -48,7 +48,7 @@ def mission(n: int) -> Mission:
 
 def measure(n: int, threads: int = 1) -> dict[str, Any]:
     cpu, wall, steps = 0.0, 0.0, 0
-    while cpu < measuring.LEAST_CPU:
+    while cpu < measuring.MIN_CPU:
         sim = Simulation(mission(n), threads=threads)
         sim.step(2)
         state = sim.state_hash(0)
@@ -56,7 +56,7 @@ def measure(n: int, threads: int = 1) -> dict[str, Any]:
         while not sim.is_over:
             sim.step()
             steps += 1
-            if n >= 30_000 and time.process_time() - begin > 2.0 * measuring.LEAST_CPU:
+            if n >= 30_000 and time.process_time() - begin > 2.0 * measuring.MIN_CPU:
                 break
         cpu += time.process_time() - begin
         wall += time.perf_counter() - wall_begin

@@ -21,7 +21,7 @@ from tussle.stock import Boids, Unicycle
 from tussle.view import Live, frame_of
 
 SIZES = (20, 200, 2000, 20000)
-LEAST_CPU = 2.0
+MIN_CPU = 2.0
 """CPU time of the steps in each measurement [s]."""
 PERIOD = 0.05
 """Time between two requests [s]."""
@@ -53,7 +53,7 @@ def share(n: int, is_watched: bool) -> float:
 
     sim.step = timed  # type: ignore[method-assign]
     with Live(sim, pace=None) as live:
-        while inside[0] < LEAST_CPU:
+        while inside[0] < MIN_CPU:
             time.sleep(PERIOD)
             if is_watched:
                 live.frame(), live.result(), live.shapes(), live.entity(1), live.warp_reached

@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 import stat
+import sys
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import Any
 
 from tussle.checksums import BLANK, MARK, is_intact, sealed
-from tussle.errors import ParameterError, TussleError, listed, nearest_name
+from tussle.errors import ParameterError, TussleError, clipped, listed, nearest_name
 
-MOST_BYTES = 1 << 25
+MAX_BYTES = 1 << 25
 """Maximum size of a document. Parsed JSON takes up to about twenty times as much memory."""
-LONGEST_SHOWN = 80
 CHECKSUM = "checksum"
 """Field of a document that holds its checksum."""
 DAMAGED = f"is damaged: its checksum does not match its content; if it was edited, remove the line {CHECKSUM!r} to read it as it is"
@@ -35,7 +36,7 @@ def size_of(path: Path, most: int | None = None) -> int:
     return about.st_size
 
 
-def read_bytes(path: Path, error: type[TussleError], most: int = MOST_BYTES) -> bytes:
+def read_bytes(path: Path, error: type[TussleError], most: int = MAX_BYTES) -> bytes:
     """Read a file. All files that a mission names are read by this function, or by `read_text`.
 
     Raises:
@@ -49,7 +50,7 @@ def read_bytes(path: Path, error: type[TussleError], most: int = MOST_BYTES) -> 
         raise error(f"{path}: cannot be read: {getattr(reason, 'strerror', None) or reason}") from None
 
 
-def read_text(path: Path, error: type[TussleError], most: int = MOST_BYTES) -> str:
+def read_text(path: Path, error: type[TussleError], most: int = MAX_BYTES) -> str:
     """Read a UTF-8 text file.
 
     Raises:
@@ -80,9 +81,13 @@ class Whole:
 class Real:
     """A number within bounds; with `is_any`, also the strings "inf", "-inf" and "nan", which stand for numbers JSON lacks."""
 
-    least: float = -1.7976931348623157e308
-    most: float = 1.7976931348623157e308
+    least: float = -sys.float_info.max
+    most: float = sys.float_info.max
     is_any: bool = False
+
+
+POSITIVE = Real(math.ulp(0.0))
+"""A finite number > 0."""
 
 
 @dataclass(frozen=True)
@@ -149,7 +154,8 @@ def problem(value: Any, rule: Rule, where: str = "") -> str:
             ]:
                 return f"{where}: the name {_shown(wrong[0])} is not allowed"
             return _first(problem(inner, rule.rule, f"{where}.{name:.80}") for name, inner in value.items())
-        case [inside]:
+        case list():  # not `case [inside]`, which takes a tuple of one allowed value for a list, too
+            (inside,) = rule
             if not isinstance(value, list):
                 return _refused(where, value, "a list")
             return _first(problem(inner, inside, f"{where}[{i}]") for i, inner in enumerate(value))
@@ -164,12 +170,12 @@ def problem(value: Any, rule: Rule, where: str = "") -> str:
 
 
 def check_argument(name: str, value: Any, rule: Rule) -> None:
-    """Check an argument of a function.
+    """Check an argument of a function; a number of NumPy counts as the Python number.
 
     Raises:
         ParameterError: It does not follow the rule.
     """
-    if violation := problem(value, rule, name):
+    if violation := problem(value.item() if getattr(value, "ndim", 1) == 0 else value, rule, name):
         raise ParameterError(violation)
 
 
@@ -187,7 +193,7 @@ def _scalar_problem(value: Any, rule: Rule, where: str) -> str:
     """Describe what is wrong with a value that is not a container."""
     if isinstance(rule, tuple):
         is_there = any(type(value) is type(one) and value == one for one in rule)
-        guess = nearest_name(value[:LONGEST_SHOWN], rule) if isinstance(value, str) else ""
+        guess = nearest_name(value, rule) if isinstance(value, str) else ""
         return (
             "" if is_there else f"{where} = {_shown(value)} is not allowed{guess}; {listed(map(repr, rule))}"
         )
@@ -203,7 +209,8 @@ def _scalar_problem(value: Any, rule: Rule, where: str) -> str:
         return "" if is_good else _refused(where, value, f"a whole number {bounds}")
     is_named = rule.is_any and value in ("inf", "-inf", "nan")
     is_good = is_named or (type(value) in (int, float) and rule.least <= value <= rule.most)
-    return "" if is_good else _refused(where, value, f"a number from {rule.least:g} to {rule.most:g}")
+    bounds = "> 0" if rule == POSITIVE else f"from {rule.least:g} to {rule.most:g}"
+    return "" if is_good else _refused(where, value, f"a number {bounds}")
 
 
 def _has_surrogates(text: str) -> bool:
@@ -224,7 +231,7 @@ def _shown(value: Any) -> str:
         if not isinstance(value, int) or abs(value) < 10**80
         else "a number of more than 80 digits"
     )
-    return text if len(text) <= LONGEST_SHOWN else text[:LONGEST_SHOWN] + "..."
+    return clipped(text)
 
 
 def _first(problems: Iterable[str]) -> str:

@@ -6,6 +6,9 @@ import difflib
 import unicodedata
 from collections.abc import Iterable
 
+MAX_SHOWN = 80
+"""Largest number of characters of a foreign text in a message."""
+
 
 class TussleError(Exception):
     """Base class of the errors that tussle raises about its input; abstract."""
@@ -120,13 +123,18 @@ class PluginError(TussleError):
         return (type(self), (self.message,), dict(self.__dict__))
 
 
+def clipped(text: str, longest: int = MAX_SHOWN) -> str:
+    """The text; of a longer one, its beginning and "..."."""
+    return text if len(text) <= longest else text[:longest] + "..."
+
+
 def nearest_name(wrong: str, allowed: Iterable[str]) -> str:
     """Suggestion to append to a wrong name: " (did you mean 'max_speed'?)", or "" if no allowed name is close."""
     names = list(allowed)
     folded: dict[str, str] = {}
     for name in names:
         folded.setdefault(name.lower(), name)
-    close = difflib.get_close_matches(wrong.lower(), folded, n=1)
+    close = difflib.get_close_matches(wrong[:MAX_SHOWN].lower(), folded, n=1)
     return f" (did you mean {folded[close[0]]!r}?)" if close else ""
 
 

@@ -48,7 +48,12 @@ class FormerNames(MetaPathFinder, Loader):
             present = package  # a plugin that was a folder and is a file now
         text = f"{former} is {present} now; the former name goes in version {GOES_IN}"
         warnings.warn(text, DeprecationWarning, stacklevel=2)
-        sys.modules[former] = import_module(present)
+        found = import_module(present)
+        if former.startswith("tussle.stock.") and not hasattr(found, "__path__") and last != "plugin":
+            vars(module).update({name: value for name, value in vars(found).items() if name[:2] != "__"})
+            module.__path__ = []  # of the folder that it was, whose modules are asked for next
+        else:
+            sys.modules[former] = found
 
 
 def install() -> None:

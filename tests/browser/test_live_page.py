@@ -8,7 +8,8 @@ from recorded_games import hunt
 from served import UNHURRIED, Watched, another_browser, family_of, send_all
 from watched_plugins import clickable
 
-from tussle import Simulation
+from tussle import Recorder, Simulation
+from tussle.record import load_inputs
 from tussle.view import Live
 from tussle.view.page.server import Page
 
@@ -201,6 +202,37 @@ def test_a_point_is_picked_and_shapes_of_plugins_are_seen(chromium):
         assert len(live.injections) == 1, "a second click is no second point"
         watched.close()
         assert not watched.trouble
+
+
+def test_what_people_do_is_recorded_and_comes_again(chromium, tmp_path):
+    with (
+        Simulation(clickable(), 1) as simulation,
+        Recorder(simulation, tmp_path / "run"),
+        Live(simulation, is_paused=True) as live,
+        Page(live, viewer=UNHURRIED) as page,
+    ):
+        watched = Watched(chromium, page)
+        for n, (x, y) in enumerate(((400, 300), (420, 330), (380, 320)), 1):
+            watched.press("p")
+            watched.tab.mouse.click(x, y)
+            watched.until(lambda n=n: len(live.injections) == n)
+            live.step(7)
+            live.settle()
+        watched.press(";")
+        watched.until(lambda: len(live.injections) == 4)
+        watched.close()
+        live.step(100)
+        live.settle()
+        wanted = simulation.state_hash()
+    inputs = load_inputs(tmp_path / "run")
+    assert [(each.step, each.name) for each in inputs] == [
+        *((step, "WorldPointClicked") for step in (0, 7, 14)), (21, "CustomKeyPress"),
+    ]  # fmt: skip
+    for _ in range(3):
+        with Simulation(clickable(), 1) as simulation:
+            simulation.play_inputs(inputs)
+            simulation.run()
+            assert simulation.state_hash() == wanted
 
 
 def test_a_browser_that_hangs_holds_up_neither_game_nor_page(chromium, game):

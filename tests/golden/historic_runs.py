@@ -57,7 +57,7 @@ def play(folder: str) -> tuple[float, set[str]]:
         f"{c.__module__}:{c.__name__}"
         for mro in classes
         for c in mro
-        if c.__module__.startswith("tussle.historic.")
+        if c.__module__.startswith("tussle.plugins.historic.")
     }
     return total, played
 

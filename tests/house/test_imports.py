@@ -32,8 +32,8 @@ NUMPY_FOR_KERNELS = {
 }
 OF_ROS = {"rospy", "geometry_msgs", "nav_msgs", "sensor_msgs"}  # packages of Debian, which `.ci/run` installs
 OF_SITE = {"griffe", "mkdocs"}  # of the extra `docs`, which `.ci/run` installs
-OTHERS = {"opendis", "actors_pb2", "actors_pb2_grpc", "command_pb2", "command_pb2_grpc"}
-"""A package that `.ci/run` installs without its dependencies, and modules that tests let protoc generate."""
+OTHERS = {"opendis", "torchrl", "actors_pb2", "actors_pb2_grpc", "command_pb2", "command_pb2_grpc"}
+"""Installed by `.ci/run` without its dependencies; tried where it is there; modules that protoc makes in tests."""
 IMPORTED_AS = {
     "foxglove_sdk": "foxglove",
     "pillow": "pil",

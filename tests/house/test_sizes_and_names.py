@@ -7,8 +7,8 @@ from collections import defaultdict
 
 from tree import SOURCE_TREES, parsed, python_files, relative
 
-MOST_LINES_OF_A_FILE = 600
-MOST_LINES_OF_A_FUNCTION = 80
+MAX_LINES_OF_A_FILE = 600
+MAX_LINES_OF_A_FUNCTION = 80
 NAMES_THAT_SAY_NOTHING = {"util", "utils", "common", "helper", "helpers", "manager", "managers", "misc"}
 
 
@@ -26,7 +26,7 @@ def lines_of_code(function: ast.FunctionDef | ast.AsyncFunctionDef) -> int:
 
 def test_files_are_short():
     lengths = {relative(path): len(path.read_text().splitlines()) for path in python_files("src")}
-    too_long = [f"{name} has {n} lines" for name, n in lengths.items() if n > MOST_LINES_OF_A_FILE]
+    too_long = [f"{name} has {n} lines" for name, n in lengths.items() if n > MAX_LINES_OF_A_FILE]
     assert not too_long, "give the second idea of each a file of its own"
 
 
@@ -35,7 +35,7 @@ def test_functions_are_short():
         f"{relative(path)}:{function.lineno}: {function.name} has {lines_of_code(function)} lines"
         for path in python_files("src")
         for function in functions(parsed(path))
-        if lines_of_code(function) > MOST_LINES_OF_A_FUNCTION
+        if lines_of_code(function) > MAX_LINES_OF_A_FUNCTION
     ]
     assert not too_long, "give a part of each a name"
 

@@ -7,7 +7,7 @@ import re
 from hypothesis import HealthCheck, settings
 from tree import python_files, relative
 
-LEAST_PATIENCE = 30.0
+MIN_PATIENCE = 30.0
 """Shorter limits on a wait for another process or thread are reached by a busy machine [s]."""
 LIMITED = re.compile(
     r"(?:communicate|wait|join)\((?:timeout=)?([\d.]+)\)|(?:monotonic|perf_counter)\(\) - \w+ < ([\d.]+)|"
@@ -29,6 +29,6 @@ def test_nothing_is_waited_for_impatiently():
         for path in python_files("tests")
         for i, line in enumerate(path.read_text().splitlines(), 1)
         for found in LIMITED.finditer(line)
-        if float(next(filter(None, found.groups()))) < LEAST_PATIENCE
+        if float(next(filter(None, found.groups()))) < MIN_PATIENCE
     ]
     assert not impatient

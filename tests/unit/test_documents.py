@@ -6,10 +6,12 @@ import json
 import os
 import time
 
+import numpy as np
 import pytest
 
 from tussle.documents import (
-    MOST_BYTES,
+    MAX_BYTES,
+    POSITIVE,
     Checked,
     Document,
     Either,
@@ -19,10 +21,12 @@ from tussle.documents import (
     Real,
     Team,
     Whole,
+    check_argument,
+    problem,
     read_text,
     size_of,
 )
-from tussle.errors import RecordError
+from tussle.errors import ParameterError, RecordError
 
 THING = Document(
     "the thing",
@@ -124,7 +128,7 @@ def test_only_regular_files_of_bounded_size_are_opened(tmp_path):
     (tmp_path / "itself").symlink_to("itself")
     (tmp_path / "folder").mkdir()
     (tmp_path / "long").touch()
-    os.truncate(tmp_path / "long", MOST_BYTES + 1)
+    os.truncate(tmp_path / "long", MAX_BYTES + 1)
     (tmp_path / "bytes").write_bytes(b"\xff")
     began = time.monotonic()
     for name, said in {
@@ -136,3 +140,22 @@ def test_only_regular_files_of_bounded_size_are_opened(tmp_path):
             read_text(tmp_path / name, RecordError)
     assert time.monotonic() - began < 60.0
     assert size_of(tmp_path / "bytes") == 1
+
+
+@pytest.mark.parametrize("value", ["a", ["x"], [], {}, None, 1, float("nan")])
+def test_a_tuple_of_one_value_allows_that_value_and_nothing_else(value):
+    assert problem("x", ("x",)) == ""
+    assert "is not allowed" in problem(value, ("x",), "field")
+
+
+@pytest.mark.parametrize("value", [1e-300, np.float64(2.0), np.int64(3), 5])
+def test_a_positive_number_of_any_kind_is_taken(value):
+    check_argument("period", value, POSITIVE)
+
+
+@pytest.mark.parametrize(
+    "value", [0.0, -1, np.float64(-2.0), float("inf"), float("nan"), True, "1", None, [1.0], np.zeros(2)]
+)
+def test_all_else_is_refused_with_the_name_and_the_rule(value):
+    with pytest.raises(ParameterError, match=r"period = .* is not allowed; it takes a number > 0"):
+        check_argument("period", value, POSITIVE)

@@ -62,11 +62,13 @@ def test_a_doorway_opens_without_a_warning(name):
 
 
 @pytest.mark.filterwarnings("ignore:tussle.* is tussle.* now")
-def test_a_pickle_of_before_loads():
-    text = b"ctussle.stock.autonomy.straight.plugin\nStraight\n."
+@pytest.mark.parametrize(
+    "module", ["tussle.stock.autonomy.straight", "tussle.stock.autonomy.straight.plugin"]
+)
+def test_a_pickle_of_before_loads(module):
     from tussle.stock import Straight
 
-    assert pickle.loads(text) is Straight
+    assert pickle.loads(f"c{module}\nStraight\n.".encode()) is Straight
 
 
 def test_a_name_that_never_was_is_not_found():

@@ -7,6 +7,7 @@ from tussle.aircraft.equations import offer
 from tussle.aircraft.functions import emit_function, expression, only
 from tussle.aircraft.metrics import Metrics
 from tussle.aircraft.node import Element
+from tussle.errors import clipped
 
 FORCES = {"DRAG": 0, "SIDE": 1, "LIFT": 2, "AXIAL": 0, "NORMAL": 2, "X": 0, "Y": 1, "Z": 2}
 MOMENTS = {"ROLL": 0, "PITCH": 1, "YAW": 2}
@@ -41,7 +42,7 @@ class Axes:
         for axis in node.find_all("axis"):
             name, frame = axis.get("name"), (axis.get("frame") or "BODY").upper()
             if frame not in FRAMES:
-                raise axis.error(f"frame {frame[:40]!r} is not known; there are: {', '.join(FRAMES)}")
+                raise axis.error(f"frame {clipped(frame)!r} is not known; there are: {', '.join(FRAMES)}")
             if name in MOMENTS:
                 self.by_axis[3 + MOMENTS[name]] = axis
                 self.moments = frame
@@ -53,7 +54,7 @@ class Axes:
                     self.forces = "AXIAL"
             else:
                 raise axis.error(
-                    f"axis {name[:40]!r} is not known; there are: {', '.join((*FORCES, *MOMENTS))}"
+                    f"axis {clipped(name)!r} is not known; there are: {', '.join((*FORCES, *MOMENTS))}"
                 )
 
 

@@ -9,7 +9,7 @@ from tussle.aircraft.code import Code, normal
 from tussle.aircraft.constants import SEA_LEVEL_PRESSURE, TEMPERATURES
 from tussle.aircraft.functions import content, emit_function, expression
 from tussle.aircraft.node import Element
-from tussle.errors import listed, nearest_name
+from tussle.errors import clipped, listed, nearest_name
 from tussle.numeric import total
 
 GAS_CONSTANT = 3.4071  # [ft lbf/mol/R]
@@ -96,7 +96,7 @@ def read_bag(node: Element, name: str, ballonets: bool = True) -> Bag:
     """
     kind = node.get("type").upper() if ballonets else "AIR"
     if kind not in GASES:
-        raise node.error(f"type {kind[:40]!r} is not known{nearest_name(kind, GASES)}; {listed(GASES)}")
+        raise node.error(f"type {clipped(kind)!r} is not known{nearest_name(kind, GASES)}; {listed(GASES)}")
     rx, ry, rz = (node.value(f"{axis}_radius", 0.0, "FT") for axis in "xyz")
     wx, wy, wz = (node.value(f"{axis}_width", 0.0, "FT") for axis in "xyz")
     if rx > 0.0 and ry > 0.0 and rz > 0.0 and wx == wy == wz == 0.0:

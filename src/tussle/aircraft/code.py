@@ -14,9 +14,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from tussle.aircraft.node import AircraftError, Element
-from tussle.errors import nearest_name
+from tussle.errors import clipped, nearest_name
+from tussle.numeric.source import INDENT
 
-MOST_LINES = 40_000
+MAX_LINES = 40_000
 NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\Z")
 SURFACE = re.compile(
     r"fcs/(left-aileron|right-aileron|elevator|rudder|flap|speedbrake|spoiler)-pos-(rad|deg)\Z"
@@ -109,8 +110,8 @@ class Code:
 
     def _add(self, line: CodeLine) -> None:
         self._total += 1
-        if self._total > MOST_LINES:
-            raise AircraftError(f"the aircraft needs more than {MOST_LINES} lines of generated code")
+        if self._total > MAX_LINES:
+            raise AircraftError(f"the aircraft needs more than {MAX_LINES} lines of generated code")
         self.section.lines.append(line)
 
     def lines(self, text: str) -> None:
@@ -265,7 +266,9 @@ class Code:
         for name, node in self.readers.items():
             if name not in made:
                 near = nearest_name(name, made)
-                message = f"property {name[:120]!r} is read, but nothing that is compiled writes it{near}"
+                message = (
+                    f"property {clipped(name, 120)!r} is read, but nothing that is compiled writes it{near}"
+                )
                 raise AircraftError(message) if node is None else node.error(message)
 
     def slots(self) -> list[str]:
@@ -280,4 +283,4 @@ class Code:
         """Lines of a section."""
         for line in self.sections[name].lines:
             if not line.name or self.is_used(line.name):
-                yield "    " * (depth + line.depth) + line.text
+                yield INDENT * (depth + line.depth) + line.text

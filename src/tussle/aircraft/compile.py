@@ -1,4 +1,4 @@
-"""From an aircraft's files to a kernel."""
+"""Compiles an aircraft's files to kernels."""
 
 from __future__ import annotations
 
@@ -38,9 +38,10 @@ from tussle.aircraft.mass import emit_mass, read_mass
 from tussle.aircraft.metrics import offer_metrics, read_metrics
 from tussle.aircraft.node import Element
 from tussle.aircraft.propulsion import RUNTIME, Propulsion, read_propulsion
-from tussle.errors import ParameterError, nearest_name
+from tussle.errors import ParameterError, clipped, nearest_name
 from tussle.numeric import store
 from tussle.numeric.kernel import Device, Kernel, jitted, renamed
+from tussle.numeric.source import define
 
 KNOWN = (
     "fileheader", "metrics", "mass_balance", "propulsion", "system", "autopilot", "flight_control", "ground_reactions",
@@ -139,7 +140,7 @@ class CompiledAircraft:
         name = normal(name)
         if name not in self.slots:
             raise ParameterError(
-                f"aircraft {self.name}: there is no property {name[:120]!r} in its state{nearest_name(name, self.slots)}"
+                f"aircraft {self.name}: there is no property {clipped(name, 120)!r} in its state{nearest_name(name, self.slots)}"
             )
         return self.slots[name]
 
@@ -229,14 +230,14 @@ def compile_aircraft(
     names = [*CORE, *slots]
     variables = {each: each if k < len(CORE) else code.variable(each) for k, each in enumerate(names)}
     names += [f"{STATE}ring {k} {j}" for k, capacity in enumerate(code.rings) for j in range(capacity)]
-    source = "\n".join(_module(code, variables)) + "\n"
-    scope = dict(SCOPE)
-    exec(compile(source, f"<aircraft {name}>", "exec"), scope)  # noqa: S102 - generated above; names in it are made of letters and digits
-    kernels = {}
-    for section in ("step", "start"):
-        made = scope[section]
-        made.__module__, made.__qualname__ = __name__, f"{name}_{section}"
-        kernels[section] = GeneratedKernel(made, "F2w F i8 i8 i8 f8 f8")
+    texts = {section: [*_function(code, section, variables)] for section in code.sections}
+    source = "\n".join(line for lines in texts.values() for line in lines) + "\n"
+    kernels = {
+        section: GeneratedKernel(
+            define(lines, SCOPE, __name__, f"{name}_{section}", f"<aircraft {name}>"), "F2w F i8 i8 i8 f8 f8"
+        )
+        for section, lines in texts.items()
+    }
     first = np.array([0.0] * len(CORE) + [code.initial.get(each, 0.0) for each in names[len(CORE) :]])
     return CompiledAircraft(
         name, {each: k for k, each in enumerate(names)}, first, code.tables,
@@ -245,30 +246,29 @@ def compile_aircraft(
     )  # fmt: skip
 
 
-def _module(code: Code, variables: dict[str, str]) -> Iterator[str]:
-    """Source of the kernels."""
-    for section in code.sections:
-        yield f"def {section}(x, tables, begin, end, n_steps, dt, frozen_dt):"
-        place = len(variables)
-        for k, capacity in enumerate(code.rings):
-            yield f"    ring_{k} = {place}"
-            place += capacity
-        for array, (rows, columns) in code.arrays.items() if section == "step" else ():
-            yield f"    {array} = np.zeros(({rows}, {columns}))"
-        yield "    for row in range(begin, end):"
-        body = [*code.body(section, 3), "            pass"]
-        # Values that the section does not use are neither loaded nor stored: that would only take time to compile.
-        used = {word for line in body for word in WORD.findall(line)}
-        mentioned = [(k, name, v) for k, (name, v) in enumerate(variables.items()) if v in used]
-        for k, _, variable in mentioned:
-            yield f"        {variable} = x[{k}, row]"
-        yield "        for _ in range(n_steps):"
-        yield from body
-        changed = code.sections[section].touched
-        for k, name, variable in mentioned:
-            if k < len(CORE) or name.startswith(STATE) or name in changed:
-                yield f"        x[{k}, row] = {variable}"
-        yield ""
+def _function(code: Code, section: str, variables: dict[str, str]) -> Iterator[str]:
+    """Source of the kernel of a section."""
+    yield f"def {section}(x, tables, begin, end, n_steps, dt, frozen_dt):"
+    place = len(variables)
+    for k, capacity in enumerate(code.rings):
+        yield f"    ring_{k} = {place}"
+        place += capacity
+    for array, (rows, columns) in code.arrays.items() if section == "step" else ():
+        yield f"    {array} = np.zeros(({rows}, {columns}))"
+    yield "    for row in range(begin, end):"
+    body = [*code.body(section, 3), "            pass"]
+    # Values that the section does not use are neither loaded nor stored: that would only take time to compile.
+    used = {word for line in body for word in WORD.findall(line)}
+    mentioned = [(k, name, v) for k, (name, v) in enumerate(variables.items()) if v in used]
+    for k, _, variable in mentioned:
+        yield f"        {variable} = x[{k}, row]"
+    yield "        for _ in range(n_steps):"
+    yield from body
+    changed = code.sections[section].touched
+    for k, name, variable in mentioned:
+        if k < len(CORE) or name.startswith(STATE) or name in changed:
+            yield f"        x[{k}, row] = {variable}"
+    yield ""
 
 
 def save_source(aircraft: CompiledAircraft) -> Path:

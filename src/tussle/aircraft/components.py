@@ -10,12 +10,12 @@ from itertools import pairwise
 from tussle.aircraft.code import Code
 from tussle.aircraft.functions import expression, only, table
 from tussle.aircraft.node import Element
-from tussle.errors import listed
+from tussle.errors import clipped, listed
 
 IGNORED = ("description", "documentation", "limitation", "output")
 OPERATORS = {"eq": "==", "==": "==", "ne": "!=", "!=": "!=", "gt": ">", ">": ">", "ge": ">=", ">=": ">=", "lt": "<", "<": "<",
              "le": "<=", "<=": "<="}  # fmt: skip
-MOST_DELAY, SHORTEST_STEP_RATE = 10_000, 240
+MAX_DELAY, MAX_STEP_RATE = 10_000, 240
 INTEGRALS = {
     "rect": "{x}", "trap": "0.5 * ({x} + {x1})", "ab2": "1.5 * {x} - 0.5 * {x1}", "ab3": "(23.0 * {x} - 16.0 * {x1} + 5.0 * {x2}) / 12.0",
 }  # fmt: skip
@@ -92,10 +92,10 @@ class ControlPart:
             return
         amount, code = found.number(), self.code
         is_time = found.get("type", "time") != "frames"
-        most = amount * SHORTEST_STEP_RATE if is_time else amount
-        if not 0.0 <= most <= MOST_DELAY:
+        most = amount * MAX_STEP_RATE if is_time else amount
+        if not 0.0 <= most <= MAX_DELAY:
             raise found.error(
-                f"a delay of {amount:g} is not allowed; it is at most {MOST_DELAY} frames of 1/{SHORTEST_STEP_RATE} s"
+                f"a delay of {amount:g} is not allowed; it is at most {MAX_DELAY} frames of 1/{MAX_STEP_RATE} s"
             )
         # JSBSim's ring of n outputs delays by n - 1 frames.
         ring, place = code.ring(int(most) + 2), self.state("delay")
@@ -235,7 +235,7 @@ class ControlPart:
         ki = code.value(gain.text, gain) if gain is not None else "0.0"
         kind = (gain.get("type") if gain is not None else "") or "ab2"
         if kind not in INTEGRALS:
-            raise self.node.error(f"integration {kind[:40]!r} is not known; {listed(INTEGRALS)}")
+            raise self.node.error(f"integration {clipped(kind)!r} is not known; {listed(INTEGRALS)}")
         dot = self.node.find("pvdot")
         rate = code.value(dot.text, dot) if dot is not None else f"({x} - {x1}) / {dt}"
         trigger = self.parameter("trigger", "0.0")
@@ -410,12 +410,14 @@ def condition(code: Code, node: Element) -> str:
     """
     logic = f" {(node.get('logic') or 'and').lower()} "
     if logic not in (" and ", " or "):
-        raise node.error(f"logic {logic.strip()[:40]!r} is not known; there are: AND, OR")
+        raise node.error(f"logic {clipped(logic.strip())!r} is not known; there are: AND, OR")
     parts = []
     for line in filter(None, (line.strip() for chunk in node.chunks for line in chunk.splitlines())):
         words = line.split()
         if len(words) != 3 or words[1].lower() not in OPERATORS:
-            raise node.error(f"{line[:80]!r} is no condition: property, operator, value; {listed(OPERATORS)}")
+            raise node.error(
+                f"{clipped(line)!r} is no condition: property, operator, value; {listed(OPERATORS)}"
+            )
         parts.append(
             f"{code.value(words[0], node)} {OPERATORS[words[1].lower()]} {code.value(words[2], node)}"
         )

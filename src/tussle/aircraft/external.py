@@ -8,6 +8,7 @@ from tussle.aircraft.aerodynamics import WIND_TO_BODY, turned
 from tussle.aircraft.code import Code
 from tussle.aircraft.functions import emit_function
 from tussle.aircraft.node import Element
+from tussle.errors import clipped
 from tussle.numeric import total
 
 LOCAL_TO_BODY = (("l11", "l12", "l13"), ("l21", "l22", "l23"), ("l31", "l32", "l33"))
@@ -40,7 +41,7 @@ def _emit_one(code: Code, node: Element) -> None:
     name, letters = f"external_reactions/{node.get('name')}", "lmn" if is_moment else "xyz"
     frame = (node.get("frame") or "BODY").upper()
     if frame not in FRAMES:
-        raise node.error(f"frame {frame[:40]!r} is not known; there are: {', '.join(FRAMES)}")
+        raise node.error(f"frame {clipped(frame)!r} is not known; there are: {', '.join(FRAMES)}")
     function = node.find("function")
     size = f"{name}/magnitude-lbsft" if is_moment else f"{name}/magnitude"
     if function is not None:

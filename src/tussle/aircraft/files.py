@@ -7,7 +7,7 @@ import re
 from pathlib import Path
 
 from tussle.aircraft.node import AircraftError, Element, read_file
-from tussle.errors import nearest_name
+from tussle.errors import clipped, nearest_name
 
 FOLDERS = {
     "engine": ("", "Engines", "Engine", "engine", "engines"),
@@ -15,7 +15,7 @@ FOLDERS = {
     "part": ("",),
 }
 NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.+ -]*(/[A-Za-z0-9_][A-Za-z0-9_.+ -]*){0,3}")
-MOST_FILES = 200
+MAX_FILES = 200
 
 
 def package_root() -> Path:
@@ -49,7 +49,7 @@ class Files:
     def __init__(self, root: Path | None, aircraft: str) -> None:
         self.root = package_root() if root is None else root
         if not NAME.fullmatch(aircraft) or "/" in aircraft:
-            raise AircraftError(f"aircraft {aircraft[:80]!r} is no name of an aircraft")
+            raise AircraftError(f"aircraft {clipped(aircraft)!r} is no name of an aircraft")
         self.folder = self.root / "aircraft" / aircraft
         self.path = self.folder / f"{aircraft}.xml"
         self.read: list[Path] = []
@@ -67,8 +67,8 @@ class Files:
 
     def _read(self, path: Path) -> Element:
         self.read.append(path)
-        if len(self.read) > MOST_FILES:
-            raise AircraftError(f"{path}: the aircraft has more than {MOST_FILES} files")
+        if len(self.read) > MAX_FILES:
+            raise AircraftError(f"{path}: the aircraft has more than {MAX_FILES} files")
         return read_file(path)
 
     def find(self, node: Element, name: str, kind: str) -> Element:
@@ -79,7 +79,7 @@ class Files:
         """
         name = name.strip()
         if not NAME.fullmatch(name):
-            raise node.error(f"{name[:80]!r} is no name of a file below the aircraft's folder")
+            raise node.error(f"{clipped(name)!r} is no name of a file below the aircraft's folder")
         name = name if name.endswith(".xml") else f"{name}.xml"
         common = {"engine": self.root / "engine", "system": self.root / "systems", "part": self.folder}[kind]
         for folder in (*(self.folder / each for each in FOLDERS[kind]), common):

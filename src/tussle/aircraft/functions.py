@@ -8,7 +8,7 @@ from itertools import pairwise
 
 from tussle.aircraft.code import Code
 from tussle.aircraft.node import AircraftError, Element
-from tussle.errors import listed, nearest_name
+from tussle.errors import clipped, listed, nearest_name
 
 TEXTS = ("description", "documentation")
 SAME = {"p": "property", "v": "value", "t": "table", "fn": "function"}
@@ -20,7 +20,7 @@ SUMS = {"product": " * ", "sum": " + ", "difference": " - "}
 KEYS = ("row", "column", "table", "axis4")
 OTHERS = ("avg", "ifthen", "and", "or", "not", "min", "max", "pi", "todegrees", "toradians", "log2", "log10", "fraction",
           "interpolate1d", "switch", "property", "value", "table", "function")  # fmt: skip
-MOST_CELLS = 200_000
+MAX_CELLS = 200_000
 
 
 def content(node: Element) -> list[Element]:
@@ -153,7 +153,7 @@ def _keys(code: Code, node: Element) -> list[str]:
     }
     unknown = [name for name in found if name not in KEYS]
     if unknown:
-        raise node.error(f"lookup {unknown[0][:40]!r} is not known; {listed(KEYS)}")
+        raise node.error(f"lookup {clipped(unknown[0])!r} is not known; {listed(KEYS)}")
     return [code.value(found[name].text, found[name]) for name in KEYS if name in found]
 
 
@@ -183,8 +183,8 @@ def _break(node: Element) -> float:
 
 def _numbers(node: Element) -> list[float]:
     words = "".join(node.chunks).split()
-    if len(words) > MOST_CELLS:
-        raise node.error(f"the table has more than {MOST_CELLS} numbers")
+    if len(words) > MAX_CELLS:
+        raise node.error(f"the table has more than {MAX_CELLS} numbers")
     try:
         numbers = [float(word) for word in words]
     except ValueError as reason:

@@ -11,8 +11,9 @@ from tussle.aircraft.equations import offer
 from tussle.aircraft.functions import emit_function
 from tussle.aircraft.mass import indexed
 from tussle.aircraft.node import Element
+from tussle.errors import clipped
 
-MOST_CONTACTS = 64
+MAX_CONTACTS = 64
 BRAKES = {"LEFT": "left", "RIGHT": "right", "CENTER": "center"}
 CASTERS = 360.0
 
@@ -41,15 +42,15 @@ def read_ground(node: Element | None) -> list[Contact]:
     if node is None:
         return []
     contacts = [_contact(each) for each in node.find_all("contact")]
-    if len(contacts) > MOST_CONTACTS:
-        raise node.error(f"it has {len(contacts)} contacts; the limit is {MOST_CONTACTS}")
+    if len(contacts) > MAX_CONTACTS:
+        raise node.error(f"it has {len(contacts)} contacts; the limit is {MAX_CONTACTS}")
     return contacts
 
 
 def _contact(node: Element) -> Contact:
     kind = node.get("type")
     if kind not in ("BOGEY", "STRUCTURE"):
-        raise node.error(f"contact type {kind[:40]!r} is not known; there are: BOGEY, STRUCTURE")
+        raise node.error(f"contact type {clipped(kind)!r} is not known; there are: BOGEY, STRUCTURE")
     for tag in ("table", "orientation"):
         if node.find(tag) is not None:
             raise node.need(tag).error("it is not supported in a contact")

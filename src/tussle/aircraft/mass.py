@@ -12,6 +12,7 @@ from tussle.aircraft.constants import POUND_PER_SLUG
 from tussle.aircraft.equations import offer
 from tussle.aircraft.node import Element
 from tussle.aircraft.propulsion.bench import given
+from tussle.errors import clipped
 from tussle.numeric import total
 
 Inertia = tuple[float, float, float, float, float, float]
@@ -88,7 +89,7 @@ def _point(node: Element) -> PointMass:
         case "ball":
             own = r * r * 0.4, r * r * 0.4
         case shape:
-            raise form.error(f"shape {shape[:40]!r} is not known; there are: {', '.join(FORMS)}")
+            raise form.error(f"shape {clipped(shape)!r} is not known; there are: {', '.join(FORMS)}")
     return PointMass(weight, location, (own[0], own[1], own[1]))
 
 

@@ -10,12 +10,12 @@ from xml.parsers import expat
 
 from tussle.aircraft.units import factor
 from tussle.documents import read_bytes
-from tussle.errors import ParameterError
+from tussle.errors import ParameterError, clipped
 
-MOST_BYTES = 8 << 20
-MOST_NODES = 200_000
-DEEPEST = 60
-MOST_ENTITIES, LONGEST_ENTITY = 100, 100
+MAX_BYTES = 8 << 20
+MAX_NODES = 200_000
+MAX_DEPTH = 60
+MAX_ENTITIES, MAX_ENTITY = 100, 100
 
 
 class AircraftError(ParameterError):
@@ -50,7 +50,7 @@ class Element:
 
     def error(self, message: str) -> AircraftError:
         """An error at this place."""
-        return AircraftError(f"{self.place}: <{self.tag[:80]}>: {message}")
+        return AircraftError(f"{self.place}: <{clipped(self.tag)}>: {message}")
 
     def find_all(self, *tags: str) -> list[Element]:
         """The children with one of the tags."""
@@ -87,14 +87,14 @@ class Element:
         try:
             value = float(text)
         except ValueError:
-            raise self.error(f"{text[:80]!r} is not a number") from None
+            raise self.error(f"{clipped(text)!r} is not a number") from None
         if not math.isfinite(value):
-            raise self.error(f"{text[:80]!r} is not a finite number")
+            raise self.error(f"{clipped(text)!r} is not a finite number")
         given = self.get("unit").upper()
         if unit and given and given != unit:
             known = factor(given, unit)
             if known is None:
-                raise self.error(f"unit {given[:80]!r} is not known here; it becomes {unit}")
+                raise self.error(f"unit {clipped(given)!r} is not known here; it becomes {unit}")
             value *= known
         return value
 
@@ -132,7 +132,7 @@ def read_file(path: Path) -> Element:
     Raises:
         AircraftError: It cannot be read, is no XML, or exceeds a limit.
     """
-    return read_text(read_bytes(path, AircraftError, MOST_BYTES), path.name)
+    return read_text(read_bytes(path, AircraftError, MAX_BYTES), path.name)
 
 
 def read_text(data: bytes, name: str) -> Element:
@@ -149,9 +149,9 @@ def read_text(data: bytes, name: str) -> Element:
         nonlocal count
         count += 1
         node = Element(tag, f"{name}:{parser.CurrentLineNumber}", attributes)
-        if count > MOST_NODES or len(stack) > DEEPEST:
+        if count > MAX_NODES or len(stack) > MAX_DEPTH:
             raise node.error(
-                f"the file has more than {MOST_NODES} elements, or they nest deeper than {DEEPEST}"
+                f"the file has more than {MAX_NODES} elements, or they nest deeper than {MAX_DEPTH}"
             )
         stack[-1].children.append(node)
         stack.append(node)
@@ -165,12 +165,12 @@ def read_text(data: bytes, name: str) -> Element:
         if (
             value is None
             or is_parameter
-            or len(value) > LONGEST_ENTITY
+            or len(value) > MAX_ENTITY
             or "&" in value
-            or entities > MOST_ENTITIES
+            or entities > MAX_ENTITIES
         ):
             raise AircraftError(
-                f"{name}:{parser.CurrentLineNumber}: entity {entity_name[:40]!r}: only {MOST_ENTITIES} short texts without "
+                f"{name}:{parser.CurrentLineNumber}: entity {clipped(entity_name)!r}: only {MAX_ENTITIES} short texts without "
                 "references can be declared"
             )
 

@@ -15,7 +15,7 @@ from tussle.numeric.quaternion import quat_conjugate, quat_multiply, quat_rotate
 FOOT = 0.3048  # [m]
 SETTLING = 4
 """Evaluations until terms in the rate of the angle of attack, which is that of the evaluation before, have settled."""
-MOST_ITERATIONS = 60
+MAX_ITERATIONS = 60
 TOLERANCE = 1e-6
 """Largest acceleration of steady flight [ft/s^2, rad/s^2]; JSBSim's own trim takes 1e-3 and 1e-4."""
 RATES = "udot", "wdot", "qidot", "vdot", "pidot", "ridot"
@@ -140,7 +140,7 @@ def trim(aircraft: CompiledAircraft, x: np.ndarray, dt: float, full: bool = Fals
     rows = [CORE_SLOT[name] for name in RATES[:m]]
     z = np.repeat(guess[:, None], n, axis=1)
     best, left = z.copy(), np.full(n, np.inf)
-    for _ in range(MOST_ITERATIONS):
+    for _ in range(MAX_ITERATIONS):
         columns = [z] + [z + (difference * (np.arange(m) == k))[:, None] for k in range(m)]
         f = flown(np.concatenate(columns, axis=1))[rows].reshape(m, m + 1, n)
         size = np.abs(f[:, 0]).max(axis=0)

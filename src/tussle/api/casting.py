@@ -10,7 +10,7 @@ from tussle.api.bodies import Bodies
 from tussle.api.context import Context
 from tussle.errors import ParameterError
 from tussle.world.rays import kernels, touching
-from tussle.world.rays.hits import FARTHEST_RAY, Hits, checked_numbers, checked_vectors, new_rays
+from tussle.world.rays.hits import MAX_RAY, Hits, checked_numbers, checked_vectors, new_rays
 
 RAYS_PER_THREAD = 1024
 
@@ -71,7 +71,7 @@ def free(
     center = checked_vectors("points", points)
     n = center.shape[1]
     _check_worlds(world, n, bodies)
-    reach = np.minimum(checked_numbers("radius", radius, n), FARTHEST_RAY)
+    reach = np.minimum(checked_numbers("radius", radius, n), MAX_RAY)
     touches = context.scene.caster.touches(center, reach)
     if bodies.n:
         tree = bodies.tree(context.boxes)

@@ -337,6 +337,17 @@ class Plugin:
         """
         return {}
 
+    def stand_in(self, is_moving: bool) -> tuple[str, dict[str, Any], str]:
+        """Return name and parameters of a faster plugin that takes the place of this one in mission files; by default none, ("", {}, "").
+
+        Args:
+            is_moving: Whether the tag's entities are born with a velocity.
+
+        Returns:
+            Its name, its parameters, and if there is none, why: a note on the mission, or "".
+        """
+        return "", {}, ""
+
     @property
     def awaited(self) -> str:
         """The program or device that this instance needs; "" for none."""

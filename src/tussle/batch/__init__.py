@@ -1,4 +1,4 @@
-"""One mission played many times, on one machine or many, and what can be learnt from it."""
+"""Many games of a mission: played on one machine or many, and what can be learnt from them."""
 
 from importlib import import_module
 from typing import TYPE_CHECKING, Any

@@ -15,7 +15,7 @@ from tussle.batch.variables import Choice, Variable
 from tussle.batch.varied import variable_entry
 from tussle.errors import MissingExtraError, ParameterError
 
-MOST_PAIRED_POINTS = 20
+MAX_PAIRED_POINTS = 20
 """Largest number of points that are all compared with the first, if choices cannot be compared."""
 
 
@@ -190,7 +190,7 @@ def _comparisons(
             found += [results.compare(name, a, b) for name in quantities]
         except ParameterError:  # points of a list may agree in nothing else
             continue
-    if choices and not found and len(results.points) <= MOST_PAIRED_POINTS:
+    if choices and not found and len(results.points) <= MAX_PAIRED_POINTS:
         found = [results.compare(name, 0, i) for i in range(1, len(results.points)) for name in quantities]
     return found
 

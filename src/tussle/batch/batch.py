@@ -34,6 +34,7 @@ from tussle.batch.tasks import BatchRun, Finished
 from tussle.batch.variables import Variable
 from tussle.batch.varied import as_variables, variable_entry
 from tussle.declare.displays import counted, line, listing, page, table
+from tussle.documents import POSITIVE, Maybe, check_argument
 from tussle.engine.simulation import Simulation
 from tussle.errors import BatchError, ParameterError, PluginError
 from tussle.mission import Loaded, Mission, PluginFile, read_mission
@@ -48,7 +49,7 @@ if TYPE_CHECKING:
     from tussle.batch.target import Target
     from tussle.batch.until import Until
 
-MOST_CHECKED = 16
+MAX_CHECKED = 16
 """Groups of which one game is started before the batch, so that errors of the mission show at once."""
 
 WORTH_A_PROCESS = 4.0
@@ -57,7 +58,7 @@ WORTH_A_PROCESS = 4.0
 STARTS_WITHIN = 120.0
 """Time that the first steps of a game may take in addition to `run_timeout` [s]: kernels may have to be compiled."""
 
-MOST_SEEDS, MOST_RUNS_UNTIL = 100_000, 1_000_000
+MAX_SEEDS, MAX_RUNS_UNTIL = 100_000, 1_000_000
 """Seeds and runs of a batch with `until` and without `runs`."""
 
 
@@ -106,10 +107,7 @@ class Batch:
         **options: Any,
     ) -> None:
         check_source(mission, "Batch")
-        if run_timeout is not None and not 0.0 < run_timeout < math.inf:
-            raise ParameterError(
-                f"run_timeout = {run_timeout!r} is not allowed; it takes a number of seconds > 0"
-            )
+        check_argument("run_timeout", run_timeout, Maybe(POSITIVE))
         self.source = mission
         self.settings = dict(settings or {})
         self.plugin_files = tuple(PluginFile.of(p) for p in plugin_files)
@@ -134,7 +132,7 @@ class Batch:
         if points is not None:
             self.variables = variables_of(chosen)
         if runs is None:
-            runs = max(1, min(MOST_SEEDS, MOST_RUNS_UNTIL // len(chosen)))
+            runs = max(1, min(MAX_SEEDS, MAX_RUNS_UNTIL // len(chosen)))
         self.plan = BatchPlan(chosen, runs, first_seed, independent)
         self._ends_by_time = ends_by_time
         self._game_s: float | None = (
@@ -231,7 +229,7 @@ class Batch:
             ParameterError: No game has that quantity.
         """
         first = {t.group: point for point, t in reversed(list(enumerate(self.design_points)))}
-        points = sorted(first.values())[:MOST_CHECKED]
+        points = sorted(first.values())[:MAX_CHECKED]
         if self._game_s is None:
             longest = 0.0
             for point in self._starting(points):

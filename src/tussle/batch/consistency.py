@@ -15,12 +15,12 @@ from tussle.batch.variables import Range
 from tussle.batch.varied import variable_of
 from tussle.errors import BatchError, ParameterError
 
-MOST_EMPTY = 200
+MAX_EMPTY = 200
 """Cells of the table of runs, with a column for each quantity of each team, per row of the results: one where all games have the same
 quantities. What plugins report may differ between points."""
-MOST_METRICS = 10_000
-MOST_VALUE = 1e100
-"""Of a metric that is finite: sums of squares of larger ones, as variances take them, are not."""
+MAX_METRICS = 10_000
+MAX_VALUE = 1e100
+"""Largest metric that counts as finite: sums of squares of larger ones, as variances take them, are not."""
 ALWAYS_ALLOWED = 1_000_000
 """Largest number of cells of a batch."""
 
@@ -87,7 +87,7 @@ def check_metrics(results: pa.Table, file: Path) -> None:
     """
     metrics = pc.unique(results["metric"])
     n_metrics, n_teams, n_runs = len(metrics), len(pc.unique(results["team"])), len(pc.unique(results["run"]))
-    if n_metrics > MOST_METRICS or n_metrics * n_teams * n_runs > ALWAYS_ALLOWED + MOST_EMPTY * len(results):
+    if n_metrics > MAX_METRICS or n_metrics * n_teams * n_runs > ALWAYS_ALLOWED + MAX_EMPTY * len(results):
         raise BatchError(
             f"{file}: {n_metrics:,} metrics of {n_teams:,} teams in {n_runs:,} runs are too many for {len(results):,} rows"
         )
@@ -98,10 +98,10 @@ def check_metrics(results: pa.Table, file: Path) -> None:
             raise BatchError(f"{file}: {error}") from None
     values = results["value"].to_numpy()
     with np.errstate(invalid="ignore"):
-        wrong = np.flatnonzero(np.isfinite(values) & (np.abs(values) > MOST_VALUE))
+        wrong = np.flatnonzero(np.isfinite(values) & (np.abs(values) > MAX_VALUE))
     if len(wrong):
         raise BatchError(
-            f"{file}: value = {values[wrong[0]]} in row {wrong[0]} is not allowed; a metric is infinite, or {MOST_VALUE:g} at the most"
+            f"{file}: value = {values[wrong[0]]} in row {wrong[0]} is not allowed; a metric is infinite, or {MAX_VALUE:g} at the most"
         )
     ended = results.filter(pc.not_equal(results["end"], "error"))
     left, begun = (

@@ -21,9 +21,9 @@ from tussle.errors import BatchError, MissingExtraError, ParameterError
 Client = Any
 """A class of `distributed`, which is annotated in part."""
 
-LOOK_EVERY = 0.5
+POLL_PERIOD = 0.5
 """Time between two questions which workers there are [s]."""
-ANSWERED_WITHIN = 30.0
+ANSWER_TIMEOUT = 30.0
 """Time in which a scheduler answers, however busy it is [s]."""
 DEATHS = 2
 """Workers that die over the same runs before these are taken to be the reason: machines are also taken away."""
@@ -145,7 +145,7 @@ class _Playing:
         self.topic = f"tussle-batch-{os.urandom(4).hex()}"
         self.parts: dict[str, float] = {}
         self.is_warned = False
-        self.look_at = self.had_any_at = time.monotonic()
+        self.poll_at = self.last_worker_at = time.monotonic()
         parts = self.parts  # the client keeps what it calls, which is not to keep the batch
         self.client.subscribe_topic(self.topic, lambda event: parts.update([event[1]]))
 
@@ -157,9 +157,9 @@ class _Playing:
         """
         while self.queue or self.again or self.under_way:
             try:
-                self._look()
+                self._poll_workers()
                 self._collect()
-                self._hand_out()  # before the results are used, for which no worker needs to wait
+                self._assign_chunks()  # before the results are used, for which no worker needs to wait
             except BatchError:
                 yield from self.finished
                 raise
@@ -167,8 +167,8 @@ class _Playing:
             yield from finished
             yield Heartbeat(sum(self.parts.get(worker, 0.0) for worker in self.under_way))
             if not self.under_way:
-                time.sleep(LOOK_EVERY)
-            wait([chunk.future for chunk in self.under_way.values()], LOOK_EVERY, FIRST_COMPLETED)
+                time.sleep(POLL_PERIOD)
+            wait([chunk.future for chunk in self.under_way.values()], POLL_PERIOD, FIRST_COMPLETED)
 
     def stop(self) -> None:
         """Cancel what is under way; workers notice at their next step."""
@@ -179,17 +179,17 @@ class _Playing:
 
     # -- workers ----------------------------------------------------------------------------------------------------------
 
-    def _look(self) -> None:
-        """Ask now and then which workers there are."""
+    def _poll_workers(self) -> None:
+        """Update the list of workers, at most once per `POLL_PERIOD`."""
         now = time.monotonic()
-        if now < self.look_at:
+        if now < self.poll_at:
             return
-        self.look_at = now + LOOK_EVERY
-        self.workers = self._there()
+        self.poll_at = now + POLL_PERIOD
+        self.workers = self._connected()
         if self.workers:
-            self.had_any_at = now
+            self.last_worker_at = now
         else:
-            self._wait_on(now - self.had_any_at)
+            self._check_patience(now - self.last_worker_at)
         n_idle = sum(self.workers.values()) - len(self.workers)
         if n_idle and not self.is_warned:
             self.is_warned = True
@@ -200,15 +200,19 @@ class _Playing:
                 stacklevel=2,
             )
 
-    def _there(self) -> dict[str, int]:
+    def _connected(self) -> dict[str, int]:
         with suppress(OSError, TimeoutError):
             if self.client.status == "running":
-                threads: dict[str, int] = self.client.nthreads(callback_timeout=ANSWERED_WITHIN)
+                threads: dict[str, int] = self.client.nthreads(callback_timeout=ANSWER_TIMEOUT)
                 return threads
         raise BatchError(f"{self.address}: the Dask scheduler is gone; finished runs are kept")
 
-    def _wait_on(self, waited: float) -> None:
-        """There has been no worker for some time [s]."""
+    def _check_patience(self, waited: float) -> None:
+        """Report the time without a worker [s], and stop the batch when the patience is over.
+
+        Raises:
+            BatchError: It is over.
+        """
         look, patience = self.executor.look, self.executor.patience
         if look is not None:
             look(waited)
@@ -220,8 +224,8 @@ class _Playing:
 
     # -- chunks -----------------------------------------------------------------------------------------------------------
 
-    def _hand_out(self) -> None:
-        """Give each worker that has nothing to do a chunk."""
+    def _assign_chunks(self) -> None:
+        """Assign a chunk to each idle worker."""
         for worker in [w for w in self.workers if w not in self.under_way]:
             chunk = self._next()
             if chunk is None:
@@ -264,7 +268,7 @@ class _Playing:
                 self.finished += chunk.future.result(timeout=0.0)
             except (KilledWorker, CancelledError, OSError):  # a TimeoutError is one
                 chunk.future.cancel()
-                self.workers = self._there()
+                self.workers = self._connected()
                 self.workers.pop(worker, None)  # it may not have been missed yet
                 self._handle_death(chunk)
             except BatchError:

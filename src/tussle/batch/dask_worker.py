@@ -21,7 +21,7 @@ from tussle.record.run_file import versions
 
 SOURCE = "source of "
 """Begins the names of hashes in `code_of`."""
-REPORT_EVERY = 1.0  # [s]; hundreds of workers report to one scheduler
+REPORT_PERIOD = 1.0  # [s]; hundreds of workers report to one scheduler
 
 _playing = threading.Lock()
 """One chunk at a time in a process: plugins need not be safe between threads, and the CPU time of a run is that of its process."""
@@ -55,7 +55,7 @@ def play_chunk(
         return taken
 
     with _playing:
-        report_at = time.monotonic() + REPORT_EVERY
+        report_at = time.monotonic() + REPORT_PERIOD
         with closing(play(package.mission(0), take, len(runs), package.watcher())) as messages:  # type: ignore[type-var]
             for message in messages:
                 task = worker.state.tasks.get(key)
@@ -64,7 +64,7 @@ def play_chunk(
                 if isinstance(message, Finished):
                     finished.append(message)
                 elif time.monotonic() >= report_at:
-                    report_at = time.monotonic() + REPORT_EVERY
+                    report_at = time.monotonic() + REPORT_PERIOD
                     worker.log_event(topic, [worker.address, len(finished) + message.under_way])
     return finished
 

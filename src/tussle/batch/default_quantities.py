@@ -52,7 +52,7 @@ def default_quantities(
     scores = [name for team in teams if (name := column_name("score", team)) in known]
     measured = _measured(known)
     left = [_left(known, team) for team in teams if _has_lost(known, team)]
-    tells = Telling(known, varied)
+    tells = InformativeQuantities(known, varied)
     leading: list[str] = []
     for names in ([*tells(scores), *tells(measured)[:MAX_MEASURED]], tells(left), tells(["t"])):
         leading = leading or tells(names)
@@ -101,8 +101,8 @@ def _left(known: Mapping[str, np.ndarray], team: int) -> str:
     return column_name("lost" if varies(known[column_name("start", team)]) else "alive", team)
 
 
-class Telling:
-    """Chooses the quantities that vary and repeat neither a varied value nor one before them.
+class InformativeQuantities:
+    """Selects informative quantities: they vary, and repeat neither a varied value nor an earlier quantity.
 
     Args:
         known: Name -> value for each run, (n,).

@@ -14,7 +14,7 @@ from functools import partial
 from types import ModuleType
 from typing import TYPE_CHECKING, Protocol
 
-from tussle.batch.stack import BEAT_EVERY, play, stack_size
+from tussle.batch.stack import HEARTBEAT_PERIOD, play, stack_size
 from tussle.batch.tasks import BatchRun, Finished, Heartbeat, Package
 from tussle.documents import Maybe, Whole, check_argument
 from tussle.errors import BatchError
@@ -27,7 +27,7 @@ OVERDUE = "it took longer"
 """Start of the error message of a run that took longer than `run_timeout`."""
 
 ENVIRONMENT = {"OMP_WAIT_POLICY": "passive", "NUMBA_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
-"""Of processes that play: each uses one core. Numba and OpenMP read these settings when they load."""
+"""Environment of worker processes: each uses one core. Numba and OpenMP read these settings when they load."""
 
 
 class Executor(Protocol):
@@ -119,7 +119,7 @@ class Processes:
         try:
             workers.extend(_Worker(package, self.stack, self.n) for _ in range(min(self.n, len(runs))))
             while workers:
-                ready = connection.wait([w.pipe for w in workers], BEAT_EVERY)
+                ready = connection.wait([w.pipe for w in workers], HEARTBEAT_PERIOD)
                 for worker in list(workers):
                     worker.kill_if_overdue()
                     if worker.pipe not in ready:
@@ -257,7 +257,7 @@ class _Worker:
 
 @contextmanager
 def _inherited() -> Iterator[None]:
-    """While open, started processes get `ENVIRONMENT`, do not import the caller's script, and ignore Ctrl-C: their parent ends them."""
+    """Context in which started processes get `ENVIRONMENT`, do not import the caller's script, and leave Ctrl-C to their parent."""
     from multiprocessing import resource_tracker
 
     script, before = sys.modules["__main__"], {name: os.environ.get(name) for name in ENVIRONMENT}

@@ -14,7 +14,7 @@ from tussle.mission.codecs import written
 
 RUNS = 1000
 """Seeds of a point after which a command with a target ends, unless it says otherwise."""
-MOST_BETWEEN = 4
+MAX_BETWEEN = 4
 """Values between two that were played."""
 COUNTS = ("--runs", "-n", "--until", "--target", "--over", "--out", "--record-runs")
 SAMPLING = ("--sample", "--samples", "--sample-seed", "--sweep")
@@ -65,7 +65,7 @@ def values_between(answer: ChoiceAnswer, over: Variable) -> list[str]:
         return []
     low, high = answer.gap
     is_whole = over.is_int if isinstance(over, Range) else all(isinstance(v, int) for v in over.values)
-    n = min(MOST_BETWEEN, int(high - low) - 1) if is_whole else MOST_BETWEEN
+    n = min(MAX_BETWEEN, int(high - low) - 1) if is_whole else MAX_BETWEEN
     values = [low + (high - low) * (i + 1) / (n + 1) for i in range(n)]
     found = [math.floor(v + 0.5) if is_whole else float(f"{v:.4g}") for v in values]
     return [over.text(v) for v in dict.fromkeys(found) if low < v < high]

@@ -15,11 +15,11 @@ import numpy as np
 
 from tussle.batch.statistics import SEED, scipy_package
 
-MOST_TUNED = 80
+MAX_TUNED = 80
 """So many points, evenly spaced by number, choose lengths and noise."""
 JITTER = 1e-8
 N_DRAWS = 200
-MOST_DRAWN = 200
+MAX_DRAWN = 200
 """So many points, evenly spaced by number, stand for all in a draw of the posterior."""
 
 Part = tuple[float, float, float]
@@ -178,7 +178,7 @@ def tuned_kernel(is_number: Sequence[bool], x: np.ndarray, observed: Observed) -
     centre += [math.log(0.8) if is_length else 1.0 for is_length in is_number]
     spread = [1.5, 2.0, *(0.8 if is_length else 1.5 for is_length in is_number)]
     middle, sd = np.array(centre), np.array(spread)
-    some = thinned(np.arange(len(x)), MOST_TUNED)
+    some = thinned(np.arange(len(x)), MAX_TUNED)
     x, observed = x[some], replace(observed, mean=observed.mean[some], weight=observed.weight[some])
 
     apart = distances(x, x)
@@ -204,7 +204,7 @@ def variance_parts(
         mode: The posterior.
         noise: Variance of the runs of a point, on the scale of the fit.
     """
-    linalg, some = scipy_package().linalg, thinned(np.arange(len(x)), MOST_DRAWN)
+    linalg, some = scipy_package().linalg, thinned(np.arange(len(x)), MAX_DRAWN)
     own = x[some]
     mean, covariance = mode.joint(own)
     covariance[np.diag_indices(len(own))] += 1e-9 * (1.0 + covariance.diagonal())

@@ -13,7 +13,7 @@ from tussle.documents import Whole, check_argument
 from tussle.errors import ParameterError
 from tussle.mission.codecs import written
 
-MOST_RUNS = 10_000_000
+MAX_RUNS = 10_000_000
 
 
 @dataclass(frozen=True)
@@ -39,9 +39,9 @@ class BatchPlan:
         check_argument("first_seed", self.first_seed, Whole(0, 2**64 - 1))
         if not self.points:
             raise ParameterError("a batch needs at least one point")
-        if self.n_runs > MOST_RUNS:
+        if self.n_runs > MAX_RUNS:
             raise ParameterError(
-                f"{len(self.points):,} points with {self.n_seeds:,} seeds each are {self.n_runs:,} runs; allowed are {MOST_RUNS:,}"
+                f"{len(self.points):,} points with {self.n_seeds:,} seeds each are {self.n_runs:,} runs; allowed are {MAX_RUNS:,}"
             )
         if self.seed(self.n_runs - 1) >= 2**64:
             raise ParameterError(

@@ -13,10 +13,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from tussle.errors import ParameterError, listed, nearest_name
+from tussle.errors import ParameterError, clipped, listed, nearest_name
 
-LONGEST_TEXT = 200
-MOST_LISTED = 12
+MAX_TEXT = 200
+MAX_LISTED = 12
 SHARES = ("wins", "ties")
 OPERATORS = (ast.Add, ast.Sub, ast.Mult, ast.Div)
 TAKES = "it takes names as score[2], ties or CPA.cpa[1], numbers, + - * / and parentheses"
@@ -55,9 +55,9 @@ class Quantity:
         Raises:
             ParameterError: The text is no such expression.
         """
-        if len(text) > LONGEST_TEXT:
+        if len(text) > MAX_TEXT:
             raise ParameterError(
-                f"quantity {text[:40]!r}... has {len(text)} characters; at most {LONGEST_TEXT} are allowed"
+                f"quantity {clipped(text)!r}... has {len(text)} characters; at most {MAX_TEXT} are allowed"
             )
         try:
             with warnings.catch_warnings():  # the parser has opinions about "1if"; it is refused below
@@ -186,7 +186,7 @@ def _column(metric: str, team: int | None, text: str, columns: Collection[str]) 
     if team is None and of_teams:
         raise ParameterError(f"quantity {text!r}: {name!r} needs a team; {listed(of_teams)}")
     known = of_teams or list(columns)
-    more = f" and {len(known) - MOST_LISTED} more" if len(known) > MOST_LISTED else ""
+    more = f" and {len(known) - MAX_LISTED} more" if len(known) > MAX_LISTED else ""
     raise ParameterError(
-        f"quantity {text!r}: there is no {name!r}{nearest_name(name, columns)}; {listed(known[:MOST_LISTED])}{more}"
+        f"quantity {text!r}: there is no {name!r}{nearest_name(name, columns)}; {listed(known[:MAX_LISTED])}{more}"
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from tussle.batch.variables import Choice, Range, Variable, parse_bounds, read_value, shown
-from tussle.errors import MissionError, ParameterError, listed, nearest_name
+from tussle.errors import MissionError, ParameterError, clipped, listed, nearest_name
 from tussle.mission.limits import Limits
 from tussle.mission.node import Budget, Node, parse
 
@@ -84,7 +84,7 @@ def _number(name: str, text: str, *, is_int: bool) -> int | float:
     value = read_value(text.strip())
     if isinstance(value, str):
         raise ParameterError(
-            f"{name}: {value[:80]!r} is not a number; vec takes numbers, as in vec='1, 2, 5'"
+            f"{name}: {clipped(value)!r} is not a number; vec takes numbers, as in vec='1, 2, 5'"
         )
     if is_int and not float(value).is_integer():
         raise ParameterError(f"{name}: {value!r} is not a whole number, as type='int' demands")

@@ -15,6 +15,8 @@ from tussle.batch.results import Results
 from tussle.batch.trust import DirectoryCode
 from tussle.errors import BatchError
 from tussle.mission import Loaded, Mission, PluginFile, read_mission
+from tussle.record.input_table import load_inputs
+from tussle.record.inputs import ExternalInput
 from tussle.record.plugin_copies import copied_plugins
 from tussle.record.schema import MISSION_FILE, RUN, RUN_FILE
 
@@ -41,6 +43,7 @@ class PlannedRun:
         seed: The seed.
         state_hash: State hash of the run there; "" where it is not finished.
         origin: What it comes from: "batch" or "recording".
+        inputs: What came from outside into a recorded run.
     """
 
     loaded: Loaded
@@ -48,6 +51,7 @@ class PlannedRun:
     seed: int
     state_hash: str
     origin: str = "batch"
+    inputs: tuple[ExternalInput, ...] = ()
 
 
 def recorded_run(
@@ -95,9 +99,10 @@ def recorded_run(
     )
     is_timed = "time" in (info["mission"].get("end_conditions") or ())
     mission = loaded.mission.ending_by_time() if is_timed else loaded.mission
-    said = worlds[world]
-    is_over = info["is_complete"] and said.get("state_hash")
-    return PlannedRun(loaded, mission, said["seed"], said["state_hash"] if is_over else "", "recording")
+    recorded = worlds[world]
+    is_over = info["is_complete"] and recorded.get("state_hash")
+    state_hash = recorded["state_hash"] if is_over else ""
+    return PlannedRun(loaded, mission, recorded["seed"], state_hash, "recording", load_inputs(path, world))
 
 
 def _not_known(code: DirectoryCode) -> str:

@@ -20,13 +20,13 @@ from tussle.batch.statistics import LEVEL, scipy_package
 from tussle.batch.variables import Choice, Range, Variable
 from tussle.errors import ParameterError, listed, nearest_name
 
-FEWEST_POINTS = 4
-FEWEST_LEVELS = 3
+MIN_POINTS = 4
+MIN_LEVELS = 3
 """A choice of numbers is a number if it has at least so many, else a choice like any other."""
 WIDE_RATIO = 50.0
 """Numbers whose largest ratio is at least this are fitted by their logarithm."""
-MOST_POINTS = 400
-"""Of more points so many are fitted, evenly spaced by number: the fit takes the third power of it."""
+MAX_POINTS = 400
+"""Largest number of points that are fitted, evenly spaced by number: the time of a fit grows with its third power."""
 PRIOR_DEGREES = 4.0
 """Degrees of freedom with which the spread over all points counts into that of a point with few runs."""
 N_AROUND = 48
@@ -114,7 +114,7 @@ def axes_of(variables: Sequence[Variable], points: Sequence[Mapping[str, Any]]) 
         if len(values) < 2:
             continue
         is_number = all(isinstance(value, (int, float)) and not isinstance(value, bool) for value in values)
-        is_number &= isinstance(variable, Range) or len(values) >= FEWEST_LEVELS
+        is_number &= isinstance(variable, Range) or len(values) >= MIN_LEVELS
         if is_number:
             values.sort()
         elif isinstance(variable, Choice):
@@ -202,12 +202,12 @@ def fitted(
     means = point_means(matrix, has_own_seeds=has_own_seeds)
     chosen = np.flatnonzero(np.isfinite(means.mean))
     axes = axes_of(variables, [points[i] for i in chosen.tolist()])
-    if not axes or len(chosen) < FEWEST_POINTS:
+    if not axes or len(chosen) < MIN_POINTS:
         raise ParameterError(
             f"{what} cannot be fitted over {'what varies' if axes else 'nothing that varies'}: "
-            f"{len(chosen)} points have runs, and a fit takes {FEWEST_POINTS} that differ"
+            f"{len(chosen)} points have runs, and a fit takes {MIN_POINTS} that differ"
         )
-    chosen = thinned(chosen, MOST_POINTS)
+    chosen = thinned(chosen, MAX_POINTS)
     known = PointMeans(means.mean[chosen], means.variance[chosen], means.common)
     n = np.isfinite(matrix).sum(axis=0)[chosen]
     at = [points[i] for i in chosen.tolist()]

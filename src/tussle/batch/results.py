@@ -18,7 +18,7 @@ from tussle.batch import run_table
 from tussle.batch.default_quantities import (
     COUNTED,
     DefaultQuantities,
-    Telling,
+    InformativeQuantities,
     default_quantities,
     is_within_one,
 )
@@ -333,12 +333,14 @@ class Results:
         return default_quantities(self._columns, list(self.teams), self._varied)
 
     def telling(self, expressions: Sequence[str]) -> list[str]:
-        """Those of some quantities that vary and repeat neither a varied value nor one before them.
+        """Return the informative ones of some quantities: they vary, and repeat neither a varied value nor an earlier one.
 
         Raises:
             ParameterError: There is no such quantity.
         """
-        return Telling({text: self.quantity(text) for text in expressions}, self._varied)(expressions)
+        return InformativeQuantities({text: self.quantity(text) for text in expressions}, self._varied)(
+            expressions
+        )
 
     @property
     def _varied(self) -> list[list[Any]]:

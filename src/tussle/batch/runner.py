@@ -29,7 +29,7 @@ from tussle.batch.varied import entries_text
 from tussle.errors import BatchError
 from tussle.record.run_file import Timings, plain, versions
 
-MOST_AT_ONCE = 100_000
+MAX_AT_ONCE = 100_000
 """Runs that an executor gets at once, about: more would only take memory."""
 
 LONG_ROUND = 4.0
@@ -174,7 +174,7 @@ class _Runner:
                 done.update(needed)
             return
         n_points, n_seeds = self.plan.n_points, self.n_asked or self.plan.n_seeds
-        most = max(1, MOST_AT_ONCE // n_points)
+        most = max(1, MAX_AT_ONCE // n_points)
         first = 0
         while first < n_seeds:
             n = n_seeds - first

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from tussle.batch.statistics import scipy_package
 from tussle.batch.variables import Choice, Point, Range, Value, Variable
-from tussle.errors import ParameterError, listed, nearest_name
+from tussle.errors import ParameterError, clipped, listed, nearest_name
 
 Floats = NDArray[np.float64]
 
@@ -27,9 +27,9 @@ Sobol sequences are balanced at powers of two (Owen, On dropping the first Sobol
 DEFAULT_LEVELS = 5
 """Values of a range without levels in a grid."""
 
-MOST_POINTS = 1_000_000
+MAX_POINTS = 1_000_000
 
-MOST_IMPROVED = 100
+MAX_IMPROVED = 100
 """Largest Latin hypercube whose points are spread further by exchanges: up to here that takes about a second at most."""
 
 
@@ -42,7 +42,7 @@ def method_for(variables: Sequence[Variable], method: str = "") -> str:
     if method:
         if method not in METHODS:
             raise ParameterError(
-                f"there is no sampling {method[:80]!r}{nearest_name(method[:80], METHODS)}; {listed(METHODS)}"
+                f"there is no sampling {clipped(method)!r}{nearest_name(method, METHODS)}; {listed(METHODS)}"
             )
         return method
     if all(isinstance(variable, Choice) or variable.levels is not None for variable in variables):
@@ -97,9 +97,9 @@ def _check_size(method: str, variables: Sequence[Variable], n: int | None) -> No
         "saltelli": drawn * (len(variables) + 2),
         "list": 0,
     }.get(method, drawn)
-    if total > MOST_POINTS:
+    if total > MAX_POINTS:
         raise ParameterError(
-            f"{method}: these are {total:,} points, more than {MOST_POINTS:,}; take fewer, or fewer values of what varies"
+            f"{method}: these are {total:,} points, more than {MAX_POINTS:,}; take fewer, or fewer values of what varies"
         )
     if n is not None and method not in DEFAULT_N:
         all_of_them = f"all {total:,} combinations" if method == "grid" else "the choices as they stand"
@@ -115,7 +115,7 @@ Rows = Iterable[Sequence[Value]]
 
 def _lhs(variables: Sequence[Variable], n: int, seed: int) -> Rows:
     # One variable alone has nothing to exchange, and its discrepancies would differ by rounding errors only.
-    is_improved = len(variables) > 1 and 2 < n <= MOST_IMPROVED
+    is_improved = len(variables) > 1 and 2 < n <= MAX_IMPROVED
     sampler = scipy_package().stats.qmc.LatinHypercube(
         d=len(variables),
         optimization="random-cd" if is_improved else None,
@@ -152,7 +152,7 @@ def _sobol_points(d: int, n: int, seed: int) -> Floats:
 
 
 def _saltelli(variables: Sequence[Variable], n: int, seed: int) -> Rows:
-    """For each of n base points A: A, A with one variable from B for each variable, B.
+    """Saltelli's sample: for each of n base points A, the point A, then A with one variable from B for each variable, then B.
 
     Saltelli et al., Variance based sensitivity analysis of model output, Computer Physics Communications 181 (2010), table 2 (b);
     in the order in which `SALib.analyze.sobol` with calc_second_order=False expects the results.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from tussle.batch.plan import MOST_RUNS
+from tussle.batch.plan import MAX_RUNS
 from tussle.batch.varied import variable_of
 from tussle.documents import Checked, Colour, Document, Either, Inside, Map, Maybe, Real, Team, Whole, problem
 from tussle.errors import BatchError, ParameterError, listed, nearest_name
@@ -77,11 +77,11 @@ BATCH = Document(
             "name": str,
             "mission": Checked({"made_in": ("file", "python")}, _against_mission),
             "variables": [VARIABLE],
-            "n_points": Whole(1, MOST_RUNS),
-            "n_seeds": Whole(1, MOST_RUNS),
+            "n_points": Whole(1, MAX_RUNS),
+            "n_seeds": Whole(1, MAX_RUNS),
             "first_seed": SEED,
             "independent": bool,
-            "n_runs": Whole(1, MOST_RUNS),
+            "n_runs": Whole(1, MAX_RUNS),
             "is_complete": bool,
             "teams": Map(str, Team),
             "colours": Maybe(Map(Colour, Team)),
@@ -108,7 +108,7 @@ BATCH = Document(
 )
 """Schema of `batch.json`."""
 
-RUN = Bounds(0, MOST_RUNS - 1)
+RUN = Bounds(0, MAX_RUNS - 1)
 RULES: Rules = {
     "run": RUN, "point": RUN, "seed": Bounds(0, 2**64 - 1), "team": Bounds(-(2**31), INT32, may_miss=True), "metric": TEXT,
     "end": TEXT, "t": NUMBER, "steps": COUNT, "state_hash": TEXT, "cpu_s": Bounds(0.0), "host": TEXT, "alive": COUNT,

@@ -12,7 +12,7 @@ from tussle.errors import ParameterError, listed, nearest_name
 from tussle.mission.codecs import written as text_of
 
 Points = Sequence[Mapping[str, Any]]
-MOST_LISTED = 12
+MAX_LISTED = 12
 
 
 def select_points(variables: Sequence[Variable], points: Points, text: str) -> list[int]:
@@ -32,10 +32,10 @@ def select_points(variables: Sequence[Variable], points: Points, text: str) -> l
     for variable, shown in wanted:
         if not any(_agree(point[variable.name], shown, variable) for point in points):
             there = list(dict.fromkeys(written(point[variable.name]) for point in points))
-            more = f" and {len(there) - MOST_LISTED} more" if len(there) > MOST_LISTED else ""
+            more = f" and {len(there) - MAX_LISTED} more" if len(there) > MAX_LISTED else ""
             raise ParameterError(
                 f"{text!r}: no point has {variable.name}={shown}{nearest_name(shown, there)}; "
-                f"{listed(there[:MOST_LISTED])}{more}"
+                f"{listed(there[:MAX_LISTED])}{more}"
             )
     raise ParameterError(f"{text!r}: each of these values is there, but no point has all of them")
 

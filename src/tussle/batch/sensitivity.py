@@ -10,13 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from tussle.batch.response import FEWEST_POINTS, Response, fitted
+from tussle.batch.response import MIN_POINTS, Response, fitted
 from tussle.batch.statistics import BOOTSTRAP_FROM, LEVEL, SEED, scipy_package
 from tussle.batch.variables import Variable
 from tussle.errors import MissingExtraError
 
 N_RESAMPLES = 200
-MOST_LEVELS = 30
+MAX_LEVELS = 30
 """Largest number of levels of a factor in an analysis of variance."""
 
 Points = Sequence[dict[str, Any]]
@@ -202,7 +202,7 @@ def _by_fit(
 ) -> list[Effect]:
     """Return the parts of the variance of the runs by a smooth fit, for points of any sample."""
     y = _means(matrix)
-    n, needed = int(np.isfinite(y).sum()), max(FEWEST_POINTS, 2 * len(variables) + 1)
+    n, needed = int(np.isfinite(y).sum()), max(MIN_POINTS, 2 * len(variables) + 1)
     if n < needed or np.nanmax(y) == np.nanmin(y):
         return _without_parts(
             found, f"they take {needed} points" if n < needed else "the quantity does not vary"
@@ -231,7 +231,7 @@ def as_factorial(columns: Sequence[Sequence[Any]], matrix: np.ndarray) -> np.nda
     """
     codes = [{value: i for i, value in enumerate(dict.fromkeys(column))} for column in columns]
     shape, n_points = tuple(map(len, codes)), matrix.shape[1]
-    if min(shape) < 2 or max(shape) > MOST_LEVELS or np.prod(shape, dtype=float) != n_points:
+    if min(shape) < 2 or max(shape) > MAX_LEVELS or np.prod(shape, dtype=float) != n_points:
         return None
     level = [np.array([code[v] for v in column]) for code, column in zip(codes, columns, strict=True)]
     place = np.ravel_multi_index(tuple(level), shape)

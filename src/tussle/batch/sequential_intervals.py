@@ -13,7 +13,7 @@ from tussle.batch.statistics import scipy_package
 N_BETS = 256
 """Bets that are placed side by side. Any number is valid; this many lose nothing up to 20,000 runs."""
 
-FEWEST_FOR_NORMAL = 10
+MIN_FOR_NORMAL = 10
 """Fewest values for the interval of a quantity without bounds, whose mean is taken to be normal."""
 
 
@@ -34,7 +34,7 @@ def sequential_interval(values: np.ndarray, alpha: float, seen: tuple[float, flo
     low, high = seen
     if low >= 0.0 and high <= 1.0:
         return bounded_interval(values, alpha)
-    if len(values) < FEWEST_FOR_NORMAL:
+    if len(values) < MIN_FOR_NORMAL:
         return -math.inf, math.inf
     if np.ptp(values) > 0.0:
         return normal_interval(values, alpha)

@@ -20,9 +20,9 @@ from tussle.errors import BatchError, ParameterError, listed, nearest_name
 
 ALIASES = {"queue": "partition", "mem": "memory", "time": "walltime"}
 TAKES = "it takes JOBS[,NAME=VALUE...], such as 20,cores=8,walltime=8:00:00,partition=short"
-ASK_EVERY = 10.0
+QUERY_PERIOD = 10.0
 """Time between two questions to Slurm [s]."""
-ANSWERED_WITHIN = 60.0
+ANSWER_TIMEOUT = 60.0
 """Time in which Slurm answers, however busy it is [s]."""
 REPLACED_WITHIN = 30.0
 """Time without workers after which jobs are looked for [s]: Dask replaces a lost one within 15 s."""
@@ -187,10 +187,10 @@ def _slurm(*command: str, text: str = "") -> subprocess.CompletedProcess[str]:
     """The answer to one of Slurm's commands."""
     try:
         return subprocess.run(  # noqa: S603
-            command, input=text, capture_output=True, text=True, check=False, timeout=ANSWERED_WITHIN
+            command, input=text, capture_output=True, text=True, check=False, timeout=ANSWER_TIMEOUT
         )
     except subprocess.TimeoutExpired:
-        return subprocess.CompletedProcess(command, 1, "", f"it does not answer within {ANSWERED_WITHIN:g} s")
+        return subprocess.CompletedProcess(command, 1, "", f"it does not answer within {ANSWER_TIMEOUT:g} s")
 
 
 def _job_watch(cluster: Any, jobs: Jobs) -> Callable[[float], None]:
@@ -203,7 +203,7 @@ def _job_watch(cluster: Any, jobs: Jobs) -> Callable[[float], None]:
     def look(waited: float) -> None:
         nonlocal asked_at
         now = time.monotonic()
-        if waited < REPLACED_WITHIN or now - asked_at < ASK_EVERY:
+        if waited < REPLACED_WITHIN or now - asked_at < QUERY_PERIOD:
             return
         asked_at = now
         numbers = [job.job_id for job in cluster.workers.values() if job.job_id]

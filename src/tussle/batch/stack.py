@@ -23,9 +23,9 @@ ROWS = 8192
 """Entities of a stack, about: with more rows a row costs no less, and the cache overflows."""
 SEQUENTIAL_ROWS = 8 * ROWS
 """The same where entities move one after another: a call has one row per world, and its fixed cost is shared by them."""
-MOST = 512
-"""Most worlds of a stack: a sequential game costs 18 % less in a stack of 512 than of 256, and with 1,024 only 5 % less again."""
-BEAT_EVERY = 0.25  # [s]
+MAX_STACK = 512
+"""Largest number of worlds of a stack: a sequential game costs 18 % less in a stack of 512 than of 256, but only 5 % less with 1,024."""
+HEARTBEAT_PERIOD = 0.25  # [s]
 
 Watch = Callable[[Simulation], Watcher]
 Take = Callable[[int], Sequence[BatchRun]]
@@ -36,14 +36,14 @@ def stack_size(mission: Mission) -> int:
     """Best number of worlds of a mission in a stack."""
     n = max(1, sum(block.count for block in mission.blocks))
     rows = SEQUENTIAL_ROWS if mission.update in ONE_BY_ONE else ROWS
-    return max(1, min(MOST, rows // n, most_worlds(mission)))
+    return max(1, min(MAX_STACK, rows // n, most_worlds(mission)))
 
 
 def most_worlds(mission: Mission) -> int:
     """The largest stack that all plugins of a mission allow."""
     plugins: list[Plugin] = [*mission.world_plugins, *(p for block in mission.blocks for p in block.plugins)]
     one = [1] if mission.update in SHUFFLED else []
-    return min([MOST, *one, *(Handle.most_worlds(p) or MOST for p in plugins)])
+    return min([MAX_STACK, *one, *(Handle.most_worlds(p) or MAX_STACK for p in plugins)])
 
 
 def play(
@@ -144,7 +144,7 @@ class _Stack:
         """Play the runs and all that follow them."""
         sim, teams = self._begin(self.under_way())
         rows, counts, n_before = sim.state.population.bodies.ints, self._count(), self.size
-        n_steps, beat_at = max(1, self.mission.steps), time.monotonic() + BEAT_EVERY
+        n_steps, beat_at = max(1, self.mission.steps), time.monotonic() + HEARTBEAT_PERIOD
         has_end = "time" in self.mission.end_conditions
         while True:
             while (
@@ -167,7 +167,7 @@ class _Stack:
                 self._note_alive(changed, left, teams, counts)
                 counts = left
             if time.monotonic() >= beat_at:
-                beat_at = time.monotonic() + BEAT_EVERY
+                beat_at = time.monotonic() + HEARTBEAT_PERIOD
                 yield Heartbeat(float(sim.steps[sim.state.running].sum()) / n_steps if has_end else 0.0)
 
     def _begin(self, runs: Sequence[BatchRun]) -> tuple[Simulation, list[int]]:

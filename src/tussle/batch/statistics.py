@@ -22,7 +22,7 @@ QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 BOOTSTRAP_FROM = 20
 """Smallest number of values for a bootstrap: the BCa interval of the mean of ten exponential numbers contains the true mean in 87 % of
 cases, Student's in 90 %. Below, Student's interval is used."""
-BOOTSTRAP_UP_TO = 2000
+MAX_BOOTSTRAPPED = 2000
 """More values make the mean normal enough (the skewness of its distribution falls with 1/sqrt(n)), and the jackknife in the BCa
 interval takes n^2 numbers. Above, the normal interval."""
 N_RESAMPLES = 2000
@@ -348,7 +348,7 @@ def mean_intervals(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         return np.full(k, np.nan), np.full(k, np.nan)
     low, high = _by_t(rows)
     varies = np.ptp(rows, axis=1) > ROUNDING * np.abs(rows).max(axis=1)
-    if BOOTSTRAP_FROM <= n <= BOOTSTRAP_UP_TO and varies.any():
+    if BOOTSTRAP_FROM <= n <= MAX_BOOTSTRAPPED and varies.any():
         low[varies], high[varies] = _by_bootstrap(rows[varies])
     return low, high
 

@@ -31,7 +31,7 @@ from tussle.record.table_values import check_values
 
 BATCH_FILE, DESIGN_FILE = "batch.json", "design.parquet"
 RESULTS_FILE, ALIVE_FILE = "results.parquet", "alive.parquet"
-MOST_IN_PART = 2000
+MAX_IN_PART = 2000
 """Runs in one file of parts: each is a record batch, which in memory takes ten times what the run takes in a table."""
 
 PARTS, RUNS, MISSION, PLUGINS, LOCK = "parts", "runs", "mission", "plugins", "lock"
@@ -151,7 +151,7 @@ class MemoryStore:
     def add(self, finished: Finished) -> None:
         """Append a finished run."""
         self._rows.append(row(finished))
-        if len(self._rows) >= MOST_IN_PART:
+        if len(self._rows) >= MAX_IN_PART:
             self._compact()
 
     def played(self) -> pa.Table:
@@ -241,7 +241,7 @@ class Store:
 
     def add(self, finished: Finished) -> None:
         """Append a finished run."""
-        if self._stream is not None and self._stream.rows >= MOST_IN_PART:
+        if self._stream is not None and self._stream.rows >= MAX_IN_PART:
             self.close_part()
         if self._stream is None:
             with reported(self.path):

@@ -14,9 +14,9 @@ from tussle.batch.sampling import METHODS
 from tussle.batch.schemas import SEED
 from tussle.batch.variables import Choice, Point, Range, Variable, parse_values
 from tussle.documents import Maybe, Real, Rule, Whole, problem, read_text
-from tussle.errors import ParameterError, listed, nearest_name
+from tussle.errors import ParameterError, clipped, listed, nearest_name
 from tussle.mission.limits import Limits
-from tussle.mission.problems import MOST_LINES
+from tussle.mission.problems import MAX_LINES
 
 KEYS: dict[str, Rule] = {
     "runs": Maybe(Whole(1)),
@@ -82,14 +82,14 @@ def read_sweep(path: str | Path) -> Sweep:
             problems = ["lists or tables are nested too deep"]
         problems = [f"{path}: {line}" for line in problems]
     if problems:
-        more = ["... and more"] if len(problems) > MOST_LINES else []
-        raise ParameterError("\n".join([*problems[:MOST_LINES], *more]))
+        more = ["... and more"] if len(problems) > MAX_LINES else []
+        raise ParameterError("\n".join([*problems[:MAX_LINES], *more]))
     return Sweep(**found)
 
 
 def _read_toml(table: Mapping[str, Any], problems: list[str]) -> dict[str, Any]:
     """Fields of `Sweep`; problems are appended."""
-    problems += _unknown(table, (*KEYS, "vary", "points"))[:MOST_LINES]
+    problems += _unknown(table, (*KEYS, "vary", "points"))[:MAX_LINES]
     problems += filter(None, (problem(table.get(key), rule, key) for key, rule in KEYS.items()))
     found = {key: table.get(key) for key in KEYS}
     if "vary" in table:
@@ -99,7 +99,7 @@ def _read_toml(table: Mapping[str, Any], problems: list[str]) -> dict[str, Any]:
 
 def _unknown(table: Mapping[str, Any], keys: Collection[str]) -> list[str]:
     return [
-        f"{key[:80]!r} is unknown{nearest_name(key[:80], keys)}; {listed(keys)}"
+        f"{clipped(key)!r} is unknown{nearest_name(key, keys)}; {listed(keys)}"
         for key in table
         if key not in keys
     ]

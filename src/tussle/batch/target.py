@@ -23,9 +23,9 @@ if TYPE_CHECKING:
 
 SIGN = re.compile(r"<=|>=|≤|≥|<|>")
 TAKES = "it takes QUANTITY >= NUMBER or QUANTITY <= NUMBER, such as 'wins[2] >= 0.95'"
-MOST_PARTS = 8
+MAX_PARTS = 8
 """Parts into which values are put together that were drawn with those of other variables."""
-LEAST_IN_PART = 5
+MIN_IN_PART = 5
 N_FITTED = 121
 """Places at which a fit is looked at."""
 
@@ -116,7 +116,7 @@ class Level:
 
 @dataclass(frozen=True)
 class Crossing:
-    """Where a smooth fit of the quantity first reaches the target: an estimate that leans on all values, and not a proof.
+    """Estimate of where the quantity first reaches the target, from a smooth fit to all values; it proves nothing.
 
     Attributes:
         value: Of the variable, by the fit; NaN where it stays below.
@@ -139,7 +139,7 @@ class Crossing:
 
 
 def crossing_of(response: Response, target: Target, over: str, choice: Mapping[str, Any]) -> Crossing | None:
-    """Where a fit reaches a target first; None where it nowhere does.
+    """Return where a fit first reaches a target; None if it does not.
 
     Args:
         response: The fit.
@@ -434,7 +434,7 @@ def _levels_of(values: Sequence[float], others: Sequence[tuple[Any, ...]]) -> tu
     levels = [np.flatnonzero(index == i).tolist() for i in range(len(distinct))]
     if len({tuple(sorted(others[i] for i in level)) for level in levels}) == 1:
         return levels, True
-    n_parts = int(np.clip(len(x) // LEAST_IN_PART, 1, MOST_PARTS))
+    n_parts = int(np.clip(len(x) // MIN_IN_PART, 1, MAX_PARTS))
     parts = np.array_split(np.arange(len(distinct)), min(n_parts, len(distinct)))
     return [[i for level in part.tolist() for i in levels[level]] for part in parts], False
 

@@ -26,7 +26,7 @@ class DirectoryCode:
 
     @property
     def is_own(self) -> bool:
-        """There is no code, or this user gave all of it to a batch before."""
+        """True if the directory has no code, or only code that this user has given to a batch before."""
         return not self.files or _is_known(digest(self.files))
 
     def __str__(self) -> str:

@@ -14,7 +14,7 @@ from tussle.batch.quantities import Quantity
 from tussle.batch.statistics import LEVEL, wilson
 from tussle.errors import ParameterError
 
-FEWEST_RUNS = 20
+MIN_RUNS = 20
 """With fewer runs a standard deviation is too uncertain to stop by."""
 
 TAKES = (
@@ -109,7 +109,7 @@ def _half(values: np.ndarray, is_share: bool) -> float:
     """Half of Wilson's interval of a share, or of the normal interval of a mean."""
     known = values[np.isfinite(values)]
     n = len(known)
-    if n < FEWEST_RUNS:
+    if n < MIN_RUNS:
         return math.inf
     if is_share:
         low, high = wilson(float(known.sum()), n)

@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from tussle.declare.units import LONGEST_TEXT, QUANTITY, unit_of
-from tussle.errors import ParameterError, UnitError, listed, nearest_name
+from tussle.declare.units import MAX_TEXT, QUANTITY, unit_of
+from tussle.errors import ParameterError, UnitError, clipped, listed, nearest_name
 from tussle.mission.codecs import written
 from tussle.numeric import exp, log
 
@@ -27,10 +27,10 @@ COLUMNS = ("run", "point", "seed")
 MODIFIERS = ("int", "log")
 WHOLE = re.compile(r"[-+]?\d{1,9}", re.ASCII)
 WHOLE_VALUE = re.compile(r"[-+]?\d{1,19}", re.ASCII)
-LARGEST_WHOLE = 10**15
-"""Up to here a whole number plus one half is a float."""
+MAX_WHOLE = 10**15
+"""Largest bound of a whole number: up to here, floats represent a whole number plus one half."""
 
-MOST_LEVELS = 1_000_000
+MAX_LEVELS = 1_000_000
 
 SHOWN_DIGITS = 12
 """Significant digits of a range's width in its values: enough to tell any two apart, few enough to be typed."""
@@ -91,7 +91,7 @@ class Range:
         for bound in (self.low, self.high) if self.is_int else ():
             if not bound.is_integer():
                 return f"the bounds of a range of whole numbers are whole, {shown(bound)} is not"
-            if abs(bound) > LARGEST_WHOLE:
+            if abs(bound) > MAX_WHOLE:
                 return f"{shown(bound)} is too large; whole numbers are allowed up to 10^15"
         return ""
 
@@ -103,8 +103,8 @@ class Range:
             return f"levels are a whole number, not {levels!r}"
         n = int(levels)
         object.__setattr__(self, "levels", n)
-        if not 2 <= n <= MOST_LEVELS:
-            return f"{n} levels are not allowed; a range takes 2 to {MOST_LEVELS:,}"
+        if not 2 <= n <= MAX_LEVELS:
+            return f"{n} levels are not allowed; a range takes 2 to {MAX_LEVELS:,}"
         if self.is_int and len(set(self.spread(n))) < n:
             return f"there are no {n} different whole numbers spread over the range; ask for fewer levels"
         return ""
@@ -283,7 +283,7 @@ def parse_variable(text: str) -> Variable:
     name, equals, values = (part.strip() for part in text.partition("="))
     if not equals:
         raise ParameterError(
-            f"{_cut(text)!r} is no variable; write a range such as prey_speed=20:30 or choices such as tactic=keep,switch"
+            f"{clipped(text)!r} is no variable; write a range such as prey_speed=20:30 or choices such as tactic=keep,switch"
         )
     return parse_values(name, values)
 
@@ -300,12 +300,12 @@ def parse_values(name: str, text: str) -> Variable:
     items = [item.strip() for item in text.split(",")]
     if "" in items:
         raise ParameterError(
-            f"{name}: a value is missing in {_cut(text)!r}; write a range as 20:30 or choices as keep,switch"
+            f"{name}: a value is missing in {clipped(text)!r}; write a range as 20:30 or choices as keep,switch"
         )
     for item in items:
-        if ":" in item and all(QUANTITY.fullmatch(part.strip()) for part in _cut(item).split(":")):
+        if ":" in item and all(QUANTITY.fullmatch(part.strip()) for part in clipped(item).split(":")):
             raise ParameterError(
-                f"{name}: the range {_cut(item)!r} cannot be among choices; write a range alone, as 20:30, or values, as 20,25,30"
+                f"{name}: the range {clipped(item)!r} cannot be among choices; write a range alone, as 20:30, or values, as 20,25,30"
             )
     return Choice(name, tuple(read_value(item) for item in items), is_text=True)
 
@@ -314,7 +314,7 @@ def read_value(text: str) -> Value:
     """A text as a number where it is one."""
     if WHOLE_VALUE.fullmatch(text) and -(2**63) <= int(text) < 2**63:
         return int(text)
-    match = QUANTITY.fullmatch(text) if len(text) <= LONGEST_TEXT else None
+    match = QUANTITY.fullmatch(text) if len(text) <= MAX_TEXT else None
     is_number = match is not None and not match["unit"] and not match["number"].endswith("inf")
     return float(text) if is_number else text
 
@@ -335,13 +335,13 @@ def parse_bounds(name: str, low: str, high: str) -> tuple[float, float, str]:
 
 
 def _quantity(name: str, text: str) -> tuple[float, str]:
-    match = QUANTITY.fullmatch(text) if len(text) <= LONGEST_TEXT else None
+    match = QUANTITY.fullmatch(text) if len(text) <= MAX_TEXT else None
     if match is not None:
         return float(match["number"]), _unit(name, match["unit"].strip())
     if text.lower() == "nan":
         return math.nan, ""  # which Range refuses
     raise ParameterError(
-        f"{name}: {_cut(text)!r} is not a number; write a range as low:high, such as 20:30, 20:30 kt or 1e-3:10:log"
+        f"{name}: {clipped(text)!r} is not a number; write a range as low:high, such as 20:30, 20:30 kt or 1e-3:10:log"
     )
 
 
@@ -360,14 +360,10 @@ def _parse_range(name: str, parts: list[str]) -> Range:
         word = "levels" if WHOLE.fullmatch(part) else part
         if word not in (*MODIFIERS, "levels"):
             raise ParameterError(
-                f"{name}: {_cut(part)!r} behind a range is not allowed{nearest_name(_cut(part), MODIFIERS)}; "
+                f"{name}: {clipped(part)!r} behind a range is not allowed{nearest_name(part, MODIFIERS)}; "
                 "allowed are int, log and a whole number of levels"
             )
         if word in found:
             raise ParameterError(f"{name}: {word} is there twice behind the range")
         found[word] = int(part) if word == "levels" else 1
     return Range(name, low, high, "int" in found, "log" in found, found.get("levels"), unit, is_text=True)
-
-
-def _cut(text: str) -> str:
-    return text if len(text) <= 80 else text[:80] + "..."

@@ -23,8 +23,8 @@ from tussle.cli.progress import home_short
 from tussle.cli.tables import Cell, Row, indented, number_tables, title
 from tussle.cli.terminal import out, put, say_note
 
-MOST_POINTS = 20
-MOST_FAILURES = 10
+MAX_POINTS = 20
+MAX_FAILURES = 10
 BAR = 20  # characters for a share of 1
 
 
@@ -173,7 +173,7 @@ def _points(found: Analysis, shows_all: bool) -> Iterable[RenderableType]:
         ("", [str(p.point), *map(written, p.values.values()), *_point_cells(p, winners)]) for p in shown
     ]
     if n_between:
-        rows.insert(MOST_POINTS // 2, ("dim", ["...", *[""] * (len(head) - 1)]))
+        rows.insert(MAX_POINTS // 2, ("dim", ["...", *[""] * (len(head) - 1)]))
     yield from number_tables(head, rows)
     if n_between:
         text = f"{n_between:,} points between the highest and the lowest {names[0]} are left out; --by-point shows all"
@@ -188,11 +188,11 @@ def _winners(found: Analysis) -> list[str]:
 
 def _selected(points: Sequence[PointResult], shows_all: bool) -> tuple[Sequence[PointResult], int]:
     """Return the points to show, and how many lie between their two halves."""
-    if shows_all or len(points) <= MOST_POINTS:
+    if shows_all or len(points) <= MAX_POINTS:
         return points, 0
     known = sorted((p for p in points if p.means[0].n), key=lambda p: -p.means[0].value)
-    n_between = max(len(known) - MOST_POINTS, 0)
-    return (known[: MOST_POINTS // 2] + known[-MOST_POINTS // 2 :] if n_between else known), n_between
+    n_between = max(len(known) - MAX_POINTS, 0)
+    return (known[: MAX_POINTS // 2] + known[-MAX_POINTS // 2 :] if n_between else known), n_between
 
 
 def _point_cells(point: PointResult, winners: Sequence[str]) -> Iterable[str]:
@@ -258,12 +258,12 @@ def _estimate(value: float | None, low: float | None, high: float | None, sign: 
 
 def _failures(found: Analysis) -> Iterable[RenderableType]:
     rows: list[Row] = []
-    for failure in found.failures[:MOST_FAILURES]:
+    for failure in found.failures[:MAX_FAILURES]:
         where = f" ({failure.point})" if failure.point else ""
         cells = [f"{failure.error}{where}", f"{failure.n:,}", f"{failure.run:,}", str(failure.seed)]
         rows.append(("red", cells))
-    if len(found.failures) > MOST_FAILURES:
-        rows.append(("dim", [f"and {len(found.failures) - MOST_FAILURES:,} others", "", "", ""]))
+    if len(found.failures) > MAX_FAILURES:
+        rows.append(("dim", [f"and {len(found.failures) - MAX_FAILURES:,} others", "", "", ""]))
     return number_tables(["error", "runs", "first", "its seed"], rows)
 
 

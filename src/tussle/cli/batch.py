@@ -43,7 +43,7 @@ from tussle.errors import BatchError, ParameterError, RecordError
 from tussle.record import load_run
 from tussle.record.plugin_columns import select
 
-MOST_POINTS = 12
+MAX_POINTS = 12
 """Points that the end of a batch shows; `tussle analyze` shows all."""
 
 
@@ -437,9 +437,9 @@ def point_tables(results: Results) -> list[Padding]:
                 ),
             ],
         )
-        for point, values in list(enumerate(results.points))[:MOST_POINTS]
+        for point, values in list(enumerate(results.points))[:MAX_POINTS]
     ]
-    if len(results.points) > MOST_POINTS:
-        more = f"and {len(results.points) - MOST_POINTS:,} more"
+    if len(results.points) > MAX_POINTS:
+        more = f"and {len(results.points) - MAX_POINTS:,} more"
         rows.append(("dim", [more, *[""] * (len(head) - 1)]))
     return number_tables(head, rows)

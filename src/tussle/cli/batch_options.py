@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from tussle.cli.options import (
-    LARGEST_SEED,
+    MAX_SEED,
     MissionOptions,
     argument,
     columns_option,
@@ -24,7 +24,7 @@ class PoolOptions(MissionOptions):
     """Options shared by all commands that play many games."""
 
     seed: Annotated[
-        int | None, option("N", "First seed; by default 1. The others follow it.", min=0, max=LARGEST_SEED)
+        int | None, option("N", "First seed; by default 1. The others follow it.", min=0, max=MAX_SEED)
     ] = None
     processes: Annotated[int | None, option("N", "Number of processes; by default one per core.", min=1)] = (
         None

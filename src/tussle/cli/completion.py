@@ -45,7 +45,7 @@ def settings(ctx: typer.Context, incomplete: str) -> list[str]:
 
     mission, files = ctx.params.get("mission"), ctx.params.get("plugin_files")
     try:
-        loaded = read_mission(mission or "", plugin_files=tuple(map(Path, files or ())))
+        loaded = read_mission(mission or "", plugin_files=tuple(map(Path, files or ())), plays=False)
     except TussleError:  # the command itself reports it
         return []
     return beginning(incomplete, all_settings(loaded))

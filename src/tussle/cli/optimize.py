@@ -20,9 +20,9 @@ from tussle.cli.progress import ProgressMeter, clock, compiling
 from tussle.cli.tables import estimate, fact_list, number_tables, title
 from tussle.cli.terminal import OK, PLUGIN_FAILED, out, put, say, say_error, say_note
 
-MOST_TRIALS = 5
+MAX_TRIALS = 5
 """Trials that the end of a search shows, the best first; trials.parquet has all."""
-MOST_STEPS = 8
+MAX_STEPS = 8
 """Improvements that the end of a search shows, the last ones."""
 RUNS_AGAIN = 1000
 """Games of the command that plays the best values again."""
@@ -163,7 +163,7 @@ def show_study(study: Study, optimization: Optimization, directory: Path, search
                 *(f"{mean:.4g}" for mean in study.constrained(trial).values()),
             ],
         )
-        for place, trial in enumerate(study.ranking[:MOST_TRIALS])
+        for place, trial in enumerate(study.ranking[:MAX_TRIALS])
     ]
     quantities = [str(constraint.quantity) for constraint in study.constraints]
     kept = "".join(f", subject to {constraint}" for constraint in study.constraints)
@@ -215,8 +215,8 @@ def _facts(study: Study) -> list[tuple[str, str]]:
         difference = estimate(lead.difference, lead.low, lead.high)
         facts.append(("lead", f"{difference} over the next best, paired by seed{noise}"))
     steps = [f"{t.objective:.4g} (trial {t.number})" for t in study.improvements]
-    more = "… → " if len(steps) > MOST_STEPS else ""
-    facts.append(("improved", more + " → ".join(steps[-MOST_STEPS:])))
+    more = "… → " if len(steps) > MAX_STEPS else ""
+    facts.append(("improved", more + " → ".join(steps[-MAX_STEPS:])))
     shares = ", ".join(f"{name} {100 * share:.0f} %" for name, share in study.importances().items())
     facts.append(("depends on", f"{shares} (of being among the best quarter; PED-ANOVA)" if shares else ""))
     return facts

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 # \b keeps click from rewrapping the lines that follow.
 EPILOG = "\b\nExit codes:\n" + "\n".join(f"  {code:>3}  {meaning}" for code, meaning in EXIT_CODES.items())
-LARGEST_SEED = 2**64 - 1
+MAX_SEED = 2**64 - 1
 RENAMED = {"--log": "--record-runs"}
 """Former names of options."""
 
@@ -189,7 +189,7 @@ class MissionOptions(PluginOptions):
     ] = field(default_factory=list)
     seed: Annotated[
         int | None,
-        option("N", "Seed of the game; by default that of the mission, or 1.", min=0, max=LARGEST_SEED),
+        option("N", "Seed of the game; by default that of the mission, or 1.", min=0, max=MAX_SEED),
     ] = None
     settings: Annotated[
         list[str],

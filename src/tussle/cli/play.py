@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import datetime as dt
 import itertools
+import math
 import re
 import shlex
 import sys
 import time
 from collections import Counter
-from collections.abc import Callable
 from contextlib import ExitStack, suppress
 from dataclasses import replace
 from functools import partial
@@ -21,7 +21,7 @@ import typer
 from tussle import documents
 from tussle.cli.interrupt import Interrupt
 from tussle.cli.options import MissionOptions
-from tussle.cli.play_options import ConvertOptions, RunOptions
+from tussle.cli.play_options import ConvertOptions, RunOptions, ViewOptions
 from tussle.cli.progress import ProgressMeter, compiling
 from tussle.cli.summary import Speed, show_summary
 from tussle.cli.tables import text_table
@@ -30,6 +30,7 @@ from tussle.declare.displays import counted
 from tussle.engine.simulation import Simulation
 from tussle.errors import BatchError, MissionError, ParameterError, RecordError, TussleError, WiringError
 from tussle.mission import Loaded, Mission, to_python, to_xml
+from tussle.pacing import Pace
 from tussle.plugins import stock
 from tussle.record.plugin_columns import select
 from tussle.record.schema import MISSION_FILE, RUN_FILE, TRAJECTORY_FILE
@@ -40,9 +41,8 @@ if TYPE_CHECKING:
     from tussle.record import Recorder
 
 SEARCHED = 10_000
-"""Bytes at the beginning of a file in which its root tag is searched."""
+"""Number of bytes at the beginning of a file in which the root tag is searched."""
 STATES = {"plays": "can be played", "waits": "wait for a program or a device", "refused": "are refused"}
-NAP = 0.05  # [s] longest sleep of a paced run, so that Ctrl-C is handled in time
 
 
 def simulate(loaded: Loaded, mission: Mission, seed: int | range, **more: Any) -> Simulation:
@@ -218,6 +218,8 @@ def run(options: RunOptions) -> int:
     with ExitStack() as stack:
         with compiling():
             simulation = stack.enter_context(simulate(loaded, mission, seed, **more))
+            if planned is not None:
+                simulation.play_inputs(planned.inputs)
             interrupt = stack.enter_context(Interrupt())
             simulation.state.context.is_interrupted = lambda: bool(interrupt.code)
             if not options.no_log:
@@ -270,24 +272,18 @@ def _play(simulation: Simulation, name: str, speed: Speed, pace: float | None, i
     speed.begin(start)
     end = simulation.mission.end if "time" in simulation.mission.end_conditions else None
 
+    clock = Pace(math.inf if pace is None else pace)
+    clock.due_in(start, 0.0)
     with ProgressMeter(name, "s", start, "× real time") as meter:
 
         def is_enough(s: Simulation) -> bool:
             t = float(s.t[0])
             meter.show(t, end)
-            if pace is not None:
-                _wait(speed.wall_began + (t - start) / pace, lambda: meter.show(t, end), interrupt)
+            clock.hold(t, s.mission.dt, lambda: interrupt.code, lambda: meter.show(t, end))
             return bool(interrupt.code)
 
         simulation.run_until(is_enough)
     speed.end(float(simulation.t[0]))
-
-
-def _wait(until: float, show: Callable[[], None], interrupt: Interrupt) -> None:
-    """Sleep until a time of `time.perf_counter` to keep the pace, and show the progress meanwhile."""
-    while (left := until - time.perf_counter()) > 0.0 and not interrupt.code:
-        time.sleep(min(left, NAP))
-        show()
 
 
 def _new_directory(name: str, seed: int) -> Path:
@@ -316,7 +312,7 @@ def _new_directory(name: str, seed: int) -> Path:
 # -- runs of a batch --------------------------------------------------------------------------------------------------------
 
 
-def planned_by(options: RunOptions) -> PlannedRun:
+def planned_by(options: RunOptions | ViewOptions) -> PlannedRun:
     """Return the run of a batch that `--from DIR:417` names, or the run of a run directory.
 
     Raises:

@@ -22,8 +22,8 @@ from tussle.cli.options import (
 
 
 @dataclass(frozen=True, kw_only=True)
-class RunOptions(MissionOptions):
-    """Play one game, record it, and show its result."""
+class AgainOptions(MissionOptions):
+    """A mission, or a game that was played before."""
 
     mission: Annotated[
         str,
@@ -43,6 +43,25 @@ class RunOptions(MissionOptions):
         bool,
         flag("--trust", "With --from: run the plugin code of a batch or run directory made by someone else."),
     ] = False
+
+    def __post_init__(self) -> None:
+        is_changed = self.mission or self.more or self.settings or self.plugin_files
+        if self.from_batch is not None and (is_changed or (self.seed, self.end, self.compat) != (None,) * 3):
+            raise typer.BadParameter(
+                "--from BATCH:RUN determines the game, so a mission, settings, --seed, --end, --compat and --plugin-path"
+                " are not allowed with it"
+            )
+        if self.from_batch is None and self.trust:
+            raise typer.BadParameter("--trust is allowed with --from only")
+        if self.from_batch is None and not self.mission:
+            raise typer.BadParameter("a mission or --from BATCH:RUN is required")
+        super().__post_init__()
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunOptions(AgainOptions):
+    """Play one game, record it, and show its result."""
+
     directory: Annotated[
         Path | None, option("DIR", "Run directory; by default runs/NAME-SEED-TIMESTAMP.", "--out")
     ] = None
@@ -77,16 +96,6 @@ class RunOptions(MissionOptions):
                 "--no-log records nothing, so --out, --log-period, --shapes, --record-columns and --results are not allowed with it"
             )
         check_positive(pace=self.pace, log_period=self.log_period)
-        is_changed = self.mission or self.more or self.settings or self.plugin_files
-        if self.from_batch is not None and (is_changed or (self.seed, self.end, self.compat) != (None,) * 3):
-            raise typer.BadParameter(
-                "--from BATCH:RUN determines the game, so a mission, settings, --seed, --end, --compat and --plugin-path"
-                " are not allowed with it"
-            )
-        if self.from_batch is None and self.trust:
-            raise typer.BadParameter("--trust is allowed with --from only")
-        if self.from_batch is None and not self.mission:
-            raise typer.BadParameter("a mission or --from BATCH:RUN is required")
         super().__post_init__()
 
 
@@ -204,7 +213,7 @@ class PageOptions(PluginOptions):
 
 
 @dataclass(frozen=True, kw_only=True)
-class ViewOptions(MissionOptions, PageOptions):
+class ViewOptions(AgainOptions, PageOptions):
     """Play one game live on a page in the browser: pause it, step it, rewind it, follow entities."""
 
     pace: Annotated[
@@ -223,7 +232,7 @@ class ViewOptions(MissionOptions, PageOptions):
     )
 
     def __post_init__(self) -> None:
-        MissionOptions.__post_init__(self)
+        AgainOptions.__post_init__(self)
         PageOptions.__post_init__(self)
         if self.record_columns is not None and self.record is None:
             raise typer.BadParameter("--record-columns is allowed with --record only")

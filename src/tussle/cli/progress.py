@@ -17,8 +17,8 @@ from rich.text import Text
 from tussle.cli.terminal import err
 from tussle.numeric import kernel, store
 
-BAR_EVERY = 0.1  # [s] between updates of a bar
-LINE_EVERY = 10.0  # [s] between lines in a log
+BAR_PERIOD = 0.1  # [s] between updates of a bar
+LINE_PERIOD = 10.0  # [s] between lines in a log
 
 
 def text_column(template: str, style: str = "none") -> TextColumn:
@@ -44,7 +44,7 @@ class ProgressMeter:
         self.before = start
         self._began = time.perf_counter()
         self._is_bar = err().is_terminal
-        self._due = self._began + (0.0 if self._is_bar else LINE_EVERY)
+        self._due = self._began + (0.0 if self._is_bar else LINE_PERIOD)
         self._bar = Progress(
             text_column("{task.description}", style="bold"),
             BarColumn(bar_width=None, complete_style="cyan", finished_style="cyan", pulse_style="cyan"),
@@ -84,7 +84,7 @@ class ProgressMeter:
         now = time.perf_counter()
         if now < self._due:
             return
-        self._due = now + (BAR_EVERY if self._is_bar else LINE_EVERY)
+        self._due = now + (BAR_PERIOD if self._is_bar else LINE_PERIOD)
         rate = (done - self.before) / max(now - self._began, 1e-9)
         shown = done if n_finished is None else n_finished
         at = f"{shown:,.0f}" + ("" if total is None else f"/{total:,.10g}") + f" {self._unit}"

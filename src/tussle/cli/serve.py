@@ -9,10 +9,8 @@ from tussle.cli.play import simulate
 from tussle.cli.play_options import ServeOptions
 from tussle.cli.progress import compiling
 from tussle.cli.terminal import OK, TERMINATED, out
+from tussle.pacing import POLL_PERIOD
 from tussle.view.serve import Server
-
-NAP = 0.1
-"""Time between two looks for Ctrl-C [s]."""
 
 
 def serve(options: ServeOptions) -> int:
@@ -31,5 +29,5 @@ def serve(options: ServeOptions) -> int:
     ):
         out().print(f"{mission.name or loaded.path.stem}: {server.url}  (Ctrl-C ends it)", soft_wrap=True)
         while not interrupt.code:
-            time.sleep(NAP)
+            time.sleep(POLL_PERIOD)
     return TERMINATED if interrupt.code == TERMINATED else OK

@@ -29,16 +29,16 @@ class Speed:
     def __init__(self, process_began: float) -> None:
         self._process_began = process_began
         self.preparation = self.wall = self.cpu = self.played = 0.0
-        self.wall_began = self._cpu_began = self._t_began = 0.0
+        self._wall_began = self._cpu_began = self._t_began = 0.0
 
     def begin(self, t: float) -> None:
         """Start the measurement at simulation time t [s]."""
-        self.wall_began, self._cpu_began, self._t_began = time.perf_counter(), time.process_time(), t
-        self.preparation = self.wall_began - self._process_began
+        self._wall_began, self._cpu_began, self._t_began = time.perf_counter(), time.process_time(), t
+        self.preparation = self._wall_began - self._process_began
 
     def end(self, t: float) -> None:
         """End the measurement at simulation time t [s]."""
-        self.wall = time.perf_counter() - self.wall_began
+        self.wall = time.perf_counter() - self._wall_began
         self.cpu = time.process_time() - self._cpu_began
         self.played = t - self._t_began
 

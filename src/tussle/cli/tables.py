@@ -19,7 +19,7 @@ Row = tuple[str, Sequence[Cell]]
 """Style and cells of a row."""
 GAP = 2
 """Distance of columns, in characters."""
-WIDEST_TEXT = 30
+MAX_TEXT_WIDTH = 30
 """Texts up to this width are not folded; longer ones are, if all columns do not fit beside each other."""
 
 
@@ -46,7 +46,7 @@ def number_tables(head: Sequence[Cell], rows: Sequence[Row]) -> list[Padding]:
     )
     room = out().width - 1
     beside = room - sum(width + GAP for width in numbers)
-    text = min(text, max(beside, min(WIDEST_TEXT, room - max(numbers, default=0) - GAP), 8))
+    text = min(text, max(beside, min(MAX_TEXT_WIDTH, room - max(numbers, default=0) - GAP), 8))
     room -= text + GAP
     groups, used = [list[tuple[int, int]]()], 0
     for i, width in enumerate(numbers, 1):

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from tussle.cli.interrupt import Interrupt
+from tussle.cli.options import read_settings
 from tussle.cli.progress import compiling
 from tussle.cli.terminal import OK, out, say
 from tussle.cli.train_options import TrainOptions
@@ -25,7 +27,8 @@ def train(options: TrainOptions) -> int:
     """
     from tussle.rl.flight import registered_task
     from tussle.rl.opponents import Pool
-    from tussle.rl.train import Settings, Trainer  # needs the packages of tussle[train]
+    from tussle.rl.settings import Settings, read_training
+    from tussle.rl.train import Trainer  # needs the packages of tussle[train]
 
     for path in options.plugin_files:
         load_plugin_file(path)
@@ -33,13 +36,21 @@ def train(options: TrainOptions) -> int:
     folder = options.directory or Path("training") / options.task.rpartition("/")[2]
     if (folder / "checkpoint.pt").exists() and not options.resume:
         raise ParameterError(f"{folder} has a checkpoint; continue it with --resume, or choose another --out")
+    settings = Settings()
+    given: list[tuple[str, dict[str, Any]]] = [("--set", dict(read_settings(options.settings)))]
+    if options.worlds is not None:
+        given.append(("--worlds", {"worlds": options.worlds}))
+    if options.settings_file is not None:
+        given.insert(0, (str(options.settings_file), read_training(options.settings_file)))
+    for where, values in given:
+        settings = settings.replaced(values, where)
     pool = None
     if options.against is not None:
         entries = options.against.split(",")
         pool = Pool(options.task, task, folder / "pool", entries, options.seed, folder / "policy.onnx")
         task = pool.task
     with compiling():
-        trainer = Trainer(task, options.task, folder, options.seed, Settings(worlds=options.worlds))
+        trainer = Trainer(task, options.task, folder, options.seed, settings)
     if options.resume:
         trainer.resume()
     with Interrupt() as interrupt:
@@ -49,22 +60,26 @@ def train(options: TrainOptions) -> int:
                 f"{line['minutes']:6.1f} min  {line['decisions']:>13,.0f} decisions  {line['episodes']:>6,.0f} episodes  "
                 f"return {line['episode_return']:10.2f}  reward {line['reward_per_decision']:10.5f}"
             )
+            if "evaluated" in line:
+                out().print(
+                    f"           evaluated: return {line['evaluated']:.2f}, 95 % interval {line['low']:.2f} to {line['high']:.2f}"
+                )
             if pool is not None:
                 pool.add(trainer.model.layers(), len(trainer.curve))
             return bool(interrupt.code)
 
         trainer.train(options.minutes, tell)
-    draw_curve(trainer.curve, folder / "curve.png", options.task)
-    say(
-        "trained",
-        f'{folder / "policy.onnx"}: <autonomy policy="{folder / "policy.onnx"}">Learned</autonomy>',
-        "bold green",
-    )
+    draw_curve(trainer.curve, trainer.evaluations, folder / "curve.png", options.task)
+    for name, path in trainer.files.items():
+        block = f' block="{task.roles[name][0]}"' if name else ""
+        say("trained", f'{path}: <autonomy policy="{path}"{block}>Learned</autonomy>', "bold green")
     return interrupt.code or OK
 
 
-def draw_curve(curve: Sequence[Sequence[float]], path: Path, title: str) -> None:
-    """Draw reward per decision and returns of episodes over decisions."""
+def draw_curve(
+    curve: Sequence[Sequence[float]], evaluations: Sequence[Sequence[float]], path: Path, title: str
+) -> None:
+    """Draw reward per decision, returns of episodes, and evaluations with their intervals over decisions."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -73,7 +88,15 @@ def draw_curve(curve: Sequence[Sequence[float]], path: Path, title: str) -> None
     upper, lower = figure.subplots(2, sharex=True)
     decisions = [line[1] for line in curve]
     upper.plot(decisions, [line[4] for line in curve])
-    lower.plot(decisions, [line[3] for line in curve], ".-")
+    lower.plot(decisions, [line[3] for line in curve], ".-", label="training")
+    if evaluations:
+        _, at, _, mean, low, high = zip(*evaluations, strict=True)
+        errors = [
+            [m - x for m, x in zip(mean, low, strict=True)],
+            [x - m for m, x in zip(mean, high, strict=True)],
+        ]
+        lower.errorbar(at, mean, errors, fmt="o", capsize=3, label="evaluation, 95 %")
+        lower.legend()
     upper.set(title=title, ylabel="reward per decision")
     lower.set(xlabel="decisions", ylabel="return of an episode")
     figure.savefig(path, dpi=120)

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated
 
-from tussle.cli.options import LARGEST_SEED, PluginOptions, argument, check_positive, flag, option
+from tussle.cli.options import MAX_SEED, PluginOptions, argument, check_positive, flag, option
 
 
 @dataclass(frozen=True, kw_only=True)
 class TrainOptions(PluginOptions):
-    """Train a policy for a task by PPO, shared by all agents, and write it as ONNX for the autonomy Learned."""
+    """Train a policy for a task by PPO, or one for each role, and write them as ONNX for the autonomy Learned."""
 
     task: Annotated[
         str,
@@ -24,16 +24,27 @@ class TrainOptions(PluginOptions):
     ] = 10.0
     seed: Annotated[
         int,
-        option(
-            "N", "Seed of worlds, weights and exploration.", min=0, max=LARGEST_SEED // 2, shows_default=True
-        ),
+        option("N", "Seed of worlds, weights and exploration.", min=0, max=MAX_SEED // 2, shows_default=True),
     ] = 1
-    worlds: Annotated[int, option("N", "Worlds that play at once.", min=1, shows_default=True)] = 32
+    worlds: Annotated[
+        int | None, option("N", "Worlds that play at once, 32 by default; same as --set worlds=N.", min=1)
+    ] = None
+    settings_file: Annotated[
+        Path | None, option("FILE", "TOML file of settings: learning_rate = 3e-4.", "--settings")
+    ] = None
+    settings: Annotated[
+        list[str],
+        option(
+            "NAME=VALUE",
+            "Setting, instead of that of the file: learning_rate=3e-4, entropy=0.01, critic=central, evaluate_every=10. Can be repeated.",
+            "--set",
+        ),
+    ] = field(default_factory=list)
     directory: Annotated[
         Path | None,
         option(
             "DIR",
-            "Gets policy.onnx, curve.png, curve.csv and checkpoint.pt; by default training/NAME.",
+            "Gets the policies, curve.png, curve.csv, evaluations.csv and checkpoint.pt; by default training/NAME.",
             "--out",
         ),
     ] = None
@@ -84,7 +95,7 @@ class LeagueOptions(PluginOptions):
             "N",
             "Seed of the first game; the others follow it.",
             min=0,
-            max=LARGEST_SEED // 2,
+            max=MAX_SEED // 2,
             shows_default=True,
         ),
     ] = 1

@@ -8,17 +8,16 @@ from contextlib import ExitStack
 from typing import Any
 
 from tussle.cli.interrupt import Interrupt
-from tussle.cli.play import record, simulate
+from tussle.cli.play import planned_by, record, simulate
 from tussle.cli.play_options import PageOptions, ReplayOptions, ViewOptions
 from tussle.cli.progress import compiling
 from tussle.cli.summary import Speed, show_summary
 from tussle.cli.terminal import OK, TERMINATED, err, out, say, say_error, say_note
+from tussle.pacing import POLL_PERIOD
 from tussle.view.live import Live
 from tussle.view.page.compare import Comparison
 from tussle.view.page.server import Page
 from tussle.view.recording import Recording
-
-NAP = 0.1  # [s] so that Ctrl-C is handled in time
 
 
 def view(options: ViewOptions) -> int:
@@ -31,7 +30,10 @@ def view(options: ViewOptions) -> int:
         PluginError: A plugin failed.
     """
     began = time.perf_counter()
-    loaded, mission, seed = options.read()
+    planned = None if options.from_batch is None else planned_by(options)
+    loaded, mission, seed = (
+        options.read() if planned is None else (planned.loaded, planned.mission, planned.seed)
+    )
     viewer = loaded.viewer
     with ExitStack() as stack:
         with compiling():
@@ -56,6 +58,7 @@ def view(options: ViewOptions) -> int:
             pace=_pace_of(viewer) if options.pace is None else options.speed,
             viewer=viewer,
             is_paused=options.paused or bool(viewer.get("start_paused", False)),
+            inputs=() if planned is None else planned.inputs,
         )
         stack.callback(live.stop)
         page = stack.enter_context(Page(live, host=options.host, port=options.port))
@@ -139,5 +142,5 @@ def watch(page: Page, interrupt: Interrupt, is_done: Callable[[], bool]) -> int:
             reported = page.game_error
             say_error(str(reported))
             err().print("The page can rewind the game to the steps before the error. Ctrl-C ends it.")
-        time.sleep(NAP)
+        time.sleep(POLL_PERIOD)
     return TERMINATED if interrupt.code == TERMINATED else OK

@@ -22,7 +22,7 @@ PER = ("entity", "world", "team")
 MAX_NUMBER = 1e30
 """Largest finite number of a parameter: with larger ones, products of a few overflow."""
 WHOLE = re.compile(r"[+-]?[0-9]{1,20}")
-MOST_INTEGER = 2**53
+MAX_INTEGER = 2**53
 """All integers up to this magnitude are exact in float64."""
 
 
@@ -134,8 +134,8 @@ class Numbers(Column):
         Raises:
             ParameterError: The text is not a value of this column.
         """
-        if len(text.replace(",", " ").split()) > texts.MOST_ITEMS:
-            raise ParameterError(f"{texts.shown(text)} has more than {texts.MOST_ITEMS:,} numbers")
+        if len(text.replace(",", " ").split()) > texts.MAX_ITEMS:
+            raise ParameterError(f"{texts.shown(text)} has more than {texts.MAX_ITEMS:,} numbers")
         parts = list(zip(self.fields or ("",), self.units, self.text_units, strict=True))
         if self.ragged:
             return texts.items(text, parts, bool(self.fields), from_geodetic)
@@ -289,7 +289,7 @@ class Param(Numbers):
             raise self._error(where, value, self.allowed())
         if not isinstance(value, (int, float, np.integer, np.floating)) or math.isnan(value):
             raise self._error(where, value, self.allowed())
-        is_inexact = isinstance(value, float) and not abs(value) <= MOST_INTEGER
+        is_inexact = isinstance(value, float) and not abs(value) <= MAX_INTEGER
         if self.dtype is int and (is_inexact or int(value) != value):
             raise self._error(where, value, self.allowed())
         number = int(value) if self.dtype is int else float(value)

@@ -7,12 +7,11 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from tussle.declare import units
-from tussle.errors import ParameterError
+from tussle.errors import MAX_SHOWN, ParameterError, clipped
 
 TRUE, FALSE = ("true", "1", "yes", "on"), ("false", "0", "no", "off")
-MOST_ITEMS = 100_000
+MAX_ITEMS = 100_000
 """Maximum count of numbers in one value."""
-LONGEST_SHOWN = 80
 ROW = re.compile(r"\s*\[([^\[\]]*)\]")
 FRAMES = ("XYZ", "GPS")
 
@@ -20,10 +19,9 @@ Part = tuple[str, str, str]
 """A component of a value: its name, its SI unit, and the unit of a bare number."""
 
 
-def shown(text: str, longest: int = LONGEST_SHOWN) -> str:
+def shown(text: str, longest: int = MAX_SHOWN) -> str:
     """Quote external text for a message, on one line and shortened."""
-    flat = " ".join(text.split())
-    return repr(flat if len(flat) <= longest else flat[:longest] + "...")
+    return repr(clipped(" ".join(text.split()), longest))
 
 
 def truth(text: str) -> bool:

@@ -15,7 +15,7 @@ from fractions import Fraction
 from functools import lru_cache
 from typing import NamedTuple
 
-from tussle.errors import DeclarationError, ParameterError, UnitError, listed, nearest_name
+from tussle.errors import DeclarationError, ParameterError, UnitError, clipped, listed, nearest_name
 
 Dimension = tuple[int, int, int, int, int, int]
 """Powers of metre, kilogram, second, ampere, kelvin, radian."""
@@ -143,7 +143,7 @@ QUANTITY = re.compile(
     r"(?P<number>[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d{1,3})?|[-+]?inf)(?![A-Za-z0-9.]*\d)\s*(?P<unit>.*)",
     re.ASCII,
 )
-LONGEST_TEXT = 200
+MAX_TEXT = 200
 
 
 @lru_cache(maxsize=512)
@@ -215,11 +215,10 @@ def parse(text: str, unit: str, text_unit: str = "") -> float:
 
 def _split(text: str) -> tuple[Fraction | float, str]:
     """Split a text into number and unit; the unit is "" if there is none."""
-    match = QUANTITY.fullmatch(text.strip()) if len(text) <= LONGEST_TEXT else None
+    match = QUANTITY.fullmatch(text.strip()) if len(text) <= MAX_TEXT else None
     if match is None:
-        shown = text if len(text) <= LONGEST_TEXT else text[:40] + "..."
         raise ParameterError(
-            f"{shown!r} is not a number; write one, with or without a unit, as in '12' or '40 kt'"
+            f"{clipped(text)!r} is not a number; write one, with or without a unit, as in '12' or '40 kt'"
         )
     number = match["number"]
     return (float(number) if number.endswith("inf") else Fraction(number)), match["unit"].strip()

@@ -1,1 +1,1 @@
-"""The engine: runs the plugins of a mission on the rows of a stack of worlds."""
+"""Runs the plugins of a mission on the rows of a stack of worlds."""

@@ -50,9 +50,9 @@ def _columns(owner: Any) -> dict[str, Numbers]:
     return {k: c for k, c in owner.declared(Numbers).items() if k not in is_shared}
 
 
-def _follow(state: SimulationState, path: str) -> tuple[Any, tuple[str, ...], str, Numbers]:
+def _located(state: SimulationState, path: str) -> tuple[Any, tuple[str, ...], str, Numbers]:
     """Resolve a path. Returns the block or world plugin, the plugin path in the block, the column's name and its declaration."""
-    owners, name = paths.follow(path, paths.MissionRoot(state.mission), paths.inside, _columns)
+    owners, name = paths.resolve(path, paths.MissionRoot(state.mission), paths.inside, _columns)
     return owners[0], tuple(p.instance_name for p in owners[1:]), name, _columns(owners[-1])[name]
 
 
@@ -73,7 +73,7 @@ def capacity(state: SimulationState, number: int) -> int:
 
 def read(state: SimulationState, path: str) -> tuple[np.ndarray, np.ndarray]:
     """See `Simulation.read`."""
-    head, key, name, column = _follow(state, path)
+    head, key, name, column = _located(state, path)
     if not isinstance(head, Block):
         values = np.moveaxis(_world_column(state, path, name), -1, 0).copy()
         return values, np.ones(len(values), bool)
@@ -120,9 +120,19 @@ def _world_column(state: SimulationState, path: str, name: str) -> np.ndarray:
     return world_binding.tables[per].array(place)
 
 
-def write(state: SimulationState, path: str, values: Any) -> None:
-    """See `Simulation.write`."""
-    head, key, name, column = _follow(state, path)
+def write(state: SimulationState, path: str, values: Any, world: int | None = None) -> np.ndarray:
+    """See `Simulation.write`.
+
+    Args:
+        state: The simulation.
+        path: Path of the column.
+        values: Values of all worlds, or (k, ...) of `world`; of a world plugin (...).
+        world: The only world that is written to.
+
+    Returns:
+        The values of all worlds, (n_worlds, capacity, ...); of a world plugin (n_worlds, ...).
+    """
+    head, key, name, column = _located(state, path)
     if isinstance(values, str):
         try:
             values = column.read(values)
@@ -130,20 +140,29 @@ def write(state: SimulationState, path: str, values: Any) -> None:
             raise type(error)(f"{path!r}: {error}") from None
     if not isinstance(head, Block):
         array = _world_column(state, path, name)
-        new_values = np.moveaxis(_shaped(path, values, np.moveaxis(array, -1, 0).shape), 0, -1)
-        _check_written(path, new_values, column)
-        array[:] = new_values
+        some = slice(None) if world is None else slice(world, world + 1)
+        target = np.moveaxis(array, -1, 0)[some]
+        new_values = _shaped(path, values, target.shape)
+        _check_written(path, np.moveaxis(new_values, 0, -1), column)
+        target[:] = new_values
         state.world_view.renew()  # it keeps values of parameters
-        return
+        return new_values
     if not key and name not in FLOATS:
         raise ParameterError(f"{path!r} cannot be written; {listed(FLOATS)}")
     if column.ragged:
         raise ParameterError(f"{path!r} is a list per entity; lists cannot be written")
     number, bodies = state.context.block_names.index(head.name), state.population.bodies
-    new_values = _shaped(path, values, (state.n_worlds, capacity(state, number), *column.shape))
+    shape = (state.n_worlds, capacity(state, number), *column.shape)
+    if world is None:
+        new_values = _shaped(path, values, shape)
+    else:
+        given = np.asarray(values)
+        new_values = np.zeros(shape, given.dtype)
+        new_values[world, : len(given)] = given
     for group in state.population.groups:
         rows = np.arange(group.first, group.last)
-        mine = np.flatnonzero(bodies.block[rows] == number)
+        is_mine = bodies.block[rows] == number
+        mine = np.flatnonzero(is_mine if world is None else is_mine & (bodies.world[rows] == world))
         binding = _binding(group, key) if key else None
         if not len(mine) or (key and binding is None):
             continue
@@ -163,6 +182,7 @@ def write(state: SimulationState, path: str, values: Any) -> None:
             target[..., mine] = part
             for view in group.views:  # views cache the reaches of parameters until the next repack
                 view.reset(bodies, group.first, group.last)
+    return new_values
 
 
 def _shaped(path: str, values: Any, shape: tuple[int, ...]) -> np.ndarray:

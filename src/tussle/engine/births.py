@@ -18,7 +18,7 @@ from tussle.numeric.rng import stream_key
 
 POSITION, HEADING = (np.uint64(stream_key("birth", label)) for label in ("position", "heading"))
 VALUES = ("heading", "climb", "roll", "speed", "heading_variance", "health", "radius", "mass")
-MOST_TRIES = 10_000
+MAX_TRIES = 10_000
 """Maximum number of attempts to find a free position for one entity."""
 TRIES_BEFORE_WAIT, TRIES_PER_STEP = 100, 10
 """The same for an entity that may wait: when it is due, and in each later step."""
@@ -262,14 +262,14 @@ class Births:
         taken[:, :n] = before
         for number, i in enumerate(mine):
             attempt, has_waited = 0, number < n_again
-            first = MOST_TRIES + TRIES_PER_STEP * int(occupancy.step[world]) if has_waited else 0
+            first = MAX_TRIES + TRIES_PER_STEP * int(occupancy.step[world]) if has_waited else 0
             tries = TRIES_PER_STEP if has_waited else TRIES_BEFORE_WAIT
             while occupancy.rejects(world, pos[:, i], taken[:, :n]):
                 attempt += 1
                 occupancy.tries[world] += 1
                 if waits and (attempt > tries or occupancy.tries[world] > most):
                     return number
-                if attempt > MOST_TRIES or occupancy.tries[world] > most:
+                if attempt > MAX_TRIES or occupancy.tries[world] > most:
                     others = f", and {most:,} in all" if occupancy.tries[world] > most else ""
                     raise MissionError(
                         f"block {spec.name!r}: no free position for entity {int(places[i]) + 1} of {spec.count} "

@@ -22,6 +22,7 @@ from tussle.declare.messages import (
 )
 from tussle.record import Events
 from tussle.record.events import BIRTH, CAPTURE, COLLISION, DEATH, END, FLAG, KINDS
+from tussle.record.inputs import InputListener
 
 if TYPE_CHECKING:
     from tussle.record.traffic import Traffic
@@ -43,12 +44,14 @@ class Listeners:
         is_replaying: True while steps are repeated that have been reported already; listeners are not called.
         on_change: Called when a listener is added or removed.
         traffic: Objects that count messages.
+        inputs: Functions called with the world and each `ExternalInput` from outside.
     """
 
     def __init__(self, context: Context) -> None:
         self.is_replaying = False
         self.on_change: Callable[[], None] = lambda: None
         self.traffic: list[Traffic] = []
+        self.inputs: list[InputListener] = []
         self._context = context
         self._listeners: list[tuple[Callable[[Events], None], frozenset[str]]] = []
         self._causes: dict[tuple[int, int], int] = {}

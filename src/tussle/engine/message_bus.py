@@ -9,7 +9,7 @@ import numpy as np
 from tussle.declare.comms import TopicBuffer
 from tussle.declare.lists import RaggedColumn
 from tussle.declare.messages import Message, Messages
-from tussle.errors import WiringError, listed, nearest_name
+from tussle.errors import ParameterError, WiringError, listed, nearest_name
 from tussle.plugins.stock import ALWAYS_THERE
 
 
@@ -47,6 +47,22 @@ class MessageBus:
                 f"{where}: topic {name!r} on {network} carries {self.topics[key].type.__name__}, not {type_.__name__}"
             )
         return self.topics[key]
+
+    def type_of(self, network: str, topic: str, name: str) -> type[Message]:
+        """The type of a message by its name: that of the topic, or else the message type that is called so.
+
+        Raises:
+            ParameterError: No type has this name.
+        """
+        known = self.topics.get((network or ALWAYS_THERE[0], topic))
+        if known is not None and known.type.__name__ == name:
+            return known.type
+        kinds = {kind.__name__: kind for kind in Message.__subclasses__()}
+        if name not in kinds:
+            raise ParameterError(
+                f"there is no message {name!r}{nearest_name(name, kinds)}; {listed(sorted(kinds))}"
+            )
+        return kinds[name]
 
     def publish_to(self, type_: type[Message], network: str) -> TopicBuffer:
         """The topic named after the message type, for messages published by world plugins."""

@@ -85,7 +85,7 @@ class Overrides:
         self.columns, self.given, self.structural = copy.deepcopy(saved)
 
     def _find(self, path: str) -> tuple[tuple[str, tuple[str, ...], str], Param]:
-        owners, name = paths.follow(path, paths.MissionRoot(self.mission), paths.inside, paths.settable)
+        owners, name = paths.resolve(path, paths.MissionRoot(self.mission), paths.inside, paths.settable)
         column, names = paths.declared(owners[-1], name), path.split(".")
         if isinstance(owners[0], Block):
             plugins, is_own = tuple(names[1:-1]), len(owners) > 1 or name in WORLD_VALUES

@@ -28,7 +28,7 @@ from tussle.world.scene import Scene
 Params = list[tuple[int, Binding, str, Any]]
 """Block number, plugin, parameter name, and its value."""
 Newborn = list[tuple[Group, np.ndarray, np.ndarray]]
-"""For each group with newborn rows: these rows, and their numbers among all newborn, (m,) each."""
+"""Rows of newborn entities by group, with their numbers among all newborn, (m,) each."""
 NOBODY = Bodies.empty(0, 1)
 
 

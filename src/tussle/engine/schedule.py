@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -13,6 +12,7 @@ import numpy as np
 from tussle.api.kinds import WorldPlugin
 from tussle.declare.columns import Subscribe
 from tussle.engine import failure
+from tussle.engine.calls import Call
 from tussle.engine.delivery import deliver
 from tussle.engine.group import Binding, Group
 from tussle.engine.rows import apply_moves
@@ -28,14 +28,6 @@ from tussle.numeric import rng
 from tussle.numeric.rng import stream_key
 
 ORDER = int(stream_key("update", "order"))
-
-
-@dataclass(frozen=True, slots=True)
-class Call:
-    """One entry of the schedule: its description, and the function to call."""
-
-    label: str
-    run: Callable[[], None]
 
 
 def compose(state: SimulationState) -> list[Call]:
@@ -60,7 +52,8 @@ def compose(state: SimulationState) -> list[Call]:
             decides = [_entity_call(state, "autonomy", group, b) for b in group.autonomies]
             turns.append((group, [*decides, *_motion(state, [group])]))
         if state.mission.update in SHUFFLED:
-            calls.append(Call("each entity in random order", partial(_take_turns, state, turns)))
+            names = dict.fromkeys(name for _, own in turns for call in own for name in call.names)
+            calls.append(Call("each entity in random order", partial(_take_turns, state, turns), (*names,)))
         else:
             calls += [call for _, own in turns for call in own]
         calls.append(Call("index current positions", bodies.end_start))
@@ -146,7 +139,7 @@ def _advance_call(state: SimulationState, group: Group, dt: float, substeps: int
             except Exception as error:
                 raise failure.in_call(error, plugin, view, group) from error
 
-    return Call(_label(state, "motion", group, group.motion), run)
+    return Call(_label(state, "motion", group, group.motion), run, _names("motion", group.motion))
 
 
 def _steering_call(state: SimulationState, steering: Steering, dt: float, substeps: int) -> Call:
@@ -163,8 +156,9 @@ def _steering_call(state: SimulationState, steering: Steering, dt: float, subste
                 raise failure.in_call(error, plugin, view, group) from error
 
     place = f" {group.place}" if state.population.is_sequential else ""
-    names = ", ".join(b.spec.instance_name for b in (*group.controllers, group.motion))
-    return Call(f"{'control, move':<12} {group.name}{place}: {names}, {substeps} substeps in one", run)
+    plugins = [b.spec.instance_name for b in (*group.controllers, group.motion)]
+    label = f"{'control, move':<12} {group.name}{place}: {', '.join(plugins)}, {substeps} substeps in one"
+    return Call(label, run, ("controller", "motion", *plugins))
 
 
 def _entity_call(state: SimulationState, kind: str, group: Group, binding: Binding, substep: int = 0) -> Call:
@@ -226,7 +220,12 @@ def _entity_call(state: SimulationState, kind: str, group: Group, binding: Bindi
                 raise failure.in_call(error, plugin, view, group) from error
 
     is_plain = cadence is None and not (inboxes or await_ready or is_linked)
-    return Call(_label(state, kind, group, binding, substep), run_plain if is_plain else run)
+    label = _label(state, kind, group, binding, substep)
+    return Call(label, run_plain if is_plain else run, _names(kind, binding))
+
+
+def _names(kind: str, binding: Binding | WorldBinding) -> tuple[str, ...]:
+    return kind, binding.spec.instance_name
 
 
 def _waits_for(group: Group, binding: Binding) -> Callable[[], None] | None:
@@ -261,7 +260,7 @@ def _world_call(state: SimulationState, kind: str, world_binding: WorldBinding) 
 
     label = f"{kind:<12} {world_binding.spec.instance_name}{_rate_text(world_binding.spec)}"
     if cadence is None:
-        return Call(label, partial(call, world_binding, world_binding.view, dt))
+        return Call(label, partial(call, world_binding, world_binding.view, dt), _names(kind, world_binding))
 
     def call_part(dt: float) -> Callable[[WorldBinding, Any], None]:
         return lambda some, w: call(some, w, dt)
@@ -273,7 +272,7 @@ def _world_call(state: SimulationState, kind: str, world_binding: WorldBinding) 
             else:
                 call_world_plugin(state.population, world_binding, worlds, call_part(since * dt))
 
-    return Call(label, run)
+    return Call(label, run, _names(kind, world_binding))
 
 
 def _label(state: SimulationState, kind: str, group: Group, binding: Binding, substep: int = 0) -> str:

@@ -7,6 +7,7 @@ import warnings
 import weakref
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, Self
 
@@ -18,10 +19,11 @@ from tussle.declare.displays import counted, line, listing, page, table
 from tussle.declare.messages import Message, Messages
 from tussle.engine import access
 from tussle.engine.arrivals import reset, spawn_due
+from tussle.engine.calls import Schedule
 from tussle.engine.reseed import branch_keys, renew_keys, set_rekeys
 from tussle.engine.result import WorldResult
 from tussle.engine.rows import place
-from tussle.engine.schedule import Call, compose
+from tussle.engine.schedule import compose
 from tussle.engine.snapshot import Snapshot, restore, snapshot, state_hash
 from tussle.engine.state import SimulationState
 from tussle.engine.step_end import remove_dead, world_result
@@ -29,6 +31,7 @@ from tussle.errors import MissionError, ParameterError, PluginError
 from tussle.mission import GivenMission, Mission, mission_of
 from tussle.mission.rekeys import Rekeys
 from tussle.mission.spec import SHUFFLED
+from tussle.record.inputs import COLUMN, ExternalInput, fields_of, of_message
 
 if TYPE_CHECKING:
     from tussle.record import FirstStates
@@ -53,6 +56,7 @@ class Simulation:
     Attributes:
         state: All data of the simulation.
         observers: Functions called with the simulation at the beginning of each step.
+        schedule: The calls of a step, in order; `schedule.insert` adds one.
         events: Listeners for births, deaths, captures, collisions and ends of worlds.
 
     Raises:
@@ -80,6 +84,7 @@ class Simulation:
         self._check(mission, numbers, on_error)
         self.mission, self.n_worlds = mission, len(numbers)
         self.observers: list[Callable[[Simulation], None]] = []
+        self._inputs: dict[int, dict[int, list[ExternalInput]]] = {}
         self.is_closed = False
         self._resumed = threading.Event()
         self._resumed.set()
@@ -87,10 +92,11 @@ class Simulation:
         self.state.context.simulation = weakref.ref(self)
         self.state.context.move = partial(place, self.state)
         self.events = self.state.events
-        self.events.on_change = self.state.population.on_new_group = self._forget_schedule
+        self.schedule = Schedule(partial(compose, self.state), weakref.ref(self))
+        self.events.on_change = self.state.population.on_new_group = self.schedule.forget
         try:
             self.reset(range(self.n_worlds))
-            self._schedule: list[Call] | None = compose(self.state)
+            _ = self.schedule.calls
             for text in self.state.message_bus.network_mismatches():
                 warnings.warn(text, RuntimeWarning, stacklevel=2)
         except Exception:
@@ -116,9 +122,6 @@ class Simulation:
                     f"{plugin.instance_name} supports at most {most} worlds in one stack, not {len(seeds)}"
                 )
 
-    def _forget_schedule(self) -> None:
-        self._schedule = None
-
     # -- running ------------------------------------------------------------------------------------------------------------
 
     @property
@@ -136,13 +139,6 @@ class Simulation:
         """True if all worlds have ended."""
         return self.state.n_running == 0
 
-    @property
-    def schedule(self) -> list[Call]:
-        """Calls of one step, in order."""
-        if self._schedule is None:
-            self._schedule = compose(self.state)
-        return self._schedule
-
     def step(self, n: int = 1) -> None:
         """Advance all running worlds by n steps.
 
@@ -156,6 +152,8 @@ class Simulation:
 
     def _step(self) -> None:
         state = self.state
+        if self._inputs:
+            self._play_inputs()
         try:
             renew_keys(state)
             if state.births.has_rates or state.world_view.births:
@@ -165,7 +163,7 @@ class Simulation:
                     observer(self)
             if state.rekeys:
                 branch_keys(state)
-            for call in self.schedule:
+            for call in self.schedule.calls:
                 call.run()
         except PluginError as error:
             self._stop(error)
@@ -266,7 +264,9 @@ class Simulation:
 
     def write(self, path: str, values: Any) -> None:
         """Set a column by path, with values shaped as from `read`. Rows of dead entities are ignored. A reset discards parameter values."""
-        access.write(self.state, path, values)
+        written = access.write(self.state, path, values)
+        for world in self._told_worlds():
+            self._tell(world, ExternalInput(self._step_of(world), COLUMN, path, written[world].tolist()))
 
     def publish(
         self,
@@ -300,7 +300,67 @@ class Simulation:
             )
         batch = Messages.make(type_, chosen, np.zeros(len(chosen), np.int64), fields)
         buffer = message_bus.topic(network, topic or type_.__name__, type_, "publish")
-        buffer.add(batch.take(np.flatnonzero(running[chosen])))
+        sent = batch.take(np.flatnonzero(running[chosen]))
+        buffer.add(sent)
+        told = self._told_worlds()
+        for number, world in enumerate(sent.world.tolist()):
+            if world in told:
+                self._tell(world, of_message(sent, number, self._step_of(world), network, topic))
+
+    def _told_worlds(self) -> list[int]:
+        """Worlds whose inputs are told to listeners."""
+        is_told = self.events.inputs and not self.events.is_replaying
+        return np.flatnonzero(self.state.running).tolist() if is_told else []
+
+    def _step_of(self, world: int) -> int:
+        return int(self.state.context.clock.step[world])
+
+    def _tell(self, world: int, given: ExternalInput) -> None:
+        for listener in self.events.inputs:
+            listener(world, given)
+
+    def play_inputs(self, inputs: Iterable[ExternalInput], world: int = 0) -> None:
+        """Let what came from outside in another game come into a world again, each before its step, also after a reset or `restore`.
+
+        `tussle.record.load_inputs` reads them from a run directory. A second call replaces those of the first.
+
+        Raises:
+            ParameterError: There is no such world, or an input cannot be repeated because a message held an object.
+        """
+        if not 0 <= world < self.n_worlds:
+            raise ParameterError(
+                f"play_inputs: world = {world!r} is not allowed; there are worlds 0 to {self.n_worlds - 1}"
+            )
+        by_step: dict[int, list[ExternalInput]] = {}
+        for each in inputs:
+            if each.values is None:
+                raise ParameterError(
+                    f"play_inputs: the message {each.name} before step {each.step} held an object that was not recorded; "
+                    "it cannot be repeated"
+                )
+            by_step.setdefault(each.step, []).append(each)
+        self._inputs[world] = by_step
+
+    def play_input(self, given: ExternalInput, world: int = 0) -> None:
+        """Repeat one input now.
+
+        Raises:
+            ParameterError: There is no such column or message, or its values do not fit.
+            WiringError: There is no such network.
+        """
+        if given.kind == COLUMN:
+            access.write(self.state, given.name, np.array(given.values), world)
+            if world in self._told_worlds():
+                self._tell(world, replace(given, step=self._step_of(world)))
+            return
+        type_ = self.state.message_bus.type_of(given.network, given.topic or given.name, given.name)
+        fields = fields_of(type_, given.values)
+        self.publish(type_, [world], network=given.network, topic=given.topic, **fields)
+
+    def _play_inputs(self) -> None:
+        for world, by_step in self._inputs.items():
+            for each in by_step.get(self._step_of(world), ()) if self.state.running[world] else ():
+                self.play_input(each, world)
 
     def snapshot(self) -> Snapshot:
         """Copy all columns. After `restore`, the simulation continues bit-identically.

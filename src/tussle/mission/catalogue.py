@@ -13,7 +13,7 @@ from typing import Any
 
 from tussle.api import Autonomy, Behavior, Controller, Interaction, Metric, MotionModel, Network, Sensor
 from tussle.api.plugin import Plugin
-from tussle.errors import MissionError, nearest_name
+from tussle.errors import MissionError, clipped, nearest_name
 from tussle.mission.laws import shipped
 from tussle.mission.plugin_files import PluginFile
 from tussle.plugins import stock
@@ -114,7 +114,7 @@ class Catalogue:
                     f"{name} is nowhere: SCRIMMAGE does not have it either; --plugin-path FILE adds yours"
                 )
             raise MissionError(
-                f"there is no plugin {name[:80]!r}{nearest_name(name[:80], self.names)}; `tussle plugins` lists them, "
+                f"there is no plugin {clipped(name)!r}{nearest_name(name, self.names)}; `tussle plugins` lists them, "
                 "and --plugin-path FILE adds those of a file"
             )
         source = self._sources[name][-1]
@@ -149,7 +149,7 @@ class Catalogue:
         found = [known.removeprefix(prefix) for known in self.names if known.startswith(prefix)]
         raise MissionError(
             f"{cls.__name__}: no plugin file has a {cls.historic_attributes.chosen_kind.format(repr(name[:80]))}"
-            f"{nearest_name(name[:80], found)}; give its file with --plugin-path"
+            f"{nearest_name(name, found)}; give its file with --plugin-path"
         )
 
     def hides(self, name: str) -> str:

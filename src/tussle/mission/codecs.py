@@ -11,14 +11,14 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from tussle.declare import texts, units
-from tussle.declare.columns import MOST_INTEGER
+from tussle.declare.columns import MAX_INTEGER
 from tussle.declare.texts import shown
 from tussle.errors import MissionError, ParameterError
 
 RATIO = re.compile(r"\s*([-+.\deE]+)\s*/\s*([-+.\deE]+)\s*", re.ASCII)
 BEHAVIOR = re.compile(r"\s*\[\s*([^\s\[\]='\"]+)")
 PAIR = re.compile(r"\s*([^\s\[\]='\"]+)\s*=\s*(?:'([^']*)'|\"([^\"]*)\"|([^\s\[\]'\"]+))")
-MOST_PLUGINS = 1000
+MAX_PLUGINS = 1000
 """Maximum number of plugins in one parameter."""
 
 
@@ -42,7 +42,7 @@ def number(text: str, unit: str = "", text_unit: str = "") -> float:
     return value
 
 
-def integer(text: str, least: int = -MOST_INTEGER, most: int = MOST_INTEGER) -> int:
+def integer(text: str, least: int = -MAX_INTEGER, most: int = MAX_INTEGER) -> int:
     """Parse an integer.
 
     Raises:
@@ -51,7 +51,7 @@ def integer(text: str, least: int = -MOST_INTEGER, most: int = MOST_INTEGER) -> 
     """
     value = number(text)
     if value != int(value) or not least <= value <= most:
-        bounds = f" from {least:,} to {most:,}" if least > -MOST_INTEGER else f" up to {most:,}"
+        bounds = f" from {least:,} to {most:,}" if least > -MAX_INTEGER else f" up to {most:,}"
         raise MissionError(f"{shown(text)} is not allowed; it takes a whole number{bounds}")
     return int(value)
 
@@ -106,8 +106,8 @@ def inline_plugins(text: str) -> list[InlinePlugin]:
             )
         place = end.end()
         found.append(InlinePlugin(match[1], attributes))
-        if len(found) > MOST_PLUGINS:
-            raise MissionError(f"there are more than {MOST_PLUGINS:,} plugins in one parameter")
+        if len(found) > MAX_PLUGINS:
+            raise MissionError(f"there are more than {MAX_PLUGINS:,} plugins in one parameter")
     if text[place:].strip(" \t\n,"):
         raise MissionError(f"{shown(text[place:])} is not a plugin; it takes [ NAME key='value' ... ]")
     return found

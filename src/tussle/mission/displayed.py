@@ -14,7 +14,7 @@ SIZE, MARGIN = 220.0, 14.0
 """Side of the picture, and the free space along it [pixels]."""
 MAX_DRAWN = 100
 """Blocks in the picture."""
-LEAST_EXTENT = 10.0
+MIN_EXTENT = 10.0
 """Smallest side of the region that is drawn [m]."""
 
 
@@ -92,7 +92,7 @@ def start_picture(blocks: Iterable[Any]) -> str:
         (min(b.position[i] - w[i] for b, w in drawn), max(b.position[i] + w[i] for b, w in drawn))
         for i in (0, 1)
     )
-    extent = max(high_x - low_x, high_y - low_y, LEAST_EXTENT)
+    extent = max(high_x - low_x, high_y - low_y, MIN_EXTENT)
     scale = (SIZE - 2.0 * MARGIN) / extent
     if not (math.isfinite(scale) and scale > 0.0):
         return ""

@@ -21,7 +21,7 @@ from tussle.mission.spec import BLOCK_VALUES, RUN, Block
 from tussle.mission.tags import BASE, ENTITY, ENTITY_ATTRIBUTES, MANY, TagSpec
 from tussle.world.scene import Base, Origin
 
-MOST_TEAM = 2**31 - 1
+MAX_TEAM = 2**31 - 1
 
 
 def expand_entity_common(root: Node, problems: Problems, budget: Budget) -> None:
@@ -212,7 +212,7 @@ class EntityReader:
         fields = Fields(node, ENTITY, self.problems)
         self.places[name] = node.place
         self._note_differences(fields)
-        team = fields.read("team_id", lambda text: codecs.integer(text, -MOST_TEAM, MOST_TEAM))
+        team = fields.read("team_id", lambda text: codecs.integer(text, -MAX_TEAM, MAX_TEAM))
         values: dict[str, Any] = {"name": name, "team": team, "count": self._count(fields)}
         values |= self._body(fields) | self._births(fields, values["count"])
         taken: set[str] = set()
@@ -316,7 +316,8 @@ class EntityReader:
             written = PluginTag.of(fields.found["motion_model"])
             if fields.has("script_name"):
                 self._add_script(fields, written)
-            return self.plugins.make(written, taken)
+            is_moving = any(fields.vector("vx", "vy", "vz")) or fields.number("speed") != 0.0
+            return self.plugins.faster(self.plugins.make(written, taken), written, is_moving)
         default = PluginTag("motion_model", ENTITY["motion_model"].default, {}, lambda _: fields.node.place)
         return self.plugins.make(default, taken)
 

@@ -15,8 +15,8 @@ from xml.sax.saxutils import escape, quoteattr
 
 from tussle.errors import MissionError
 from tussle.mission.limits import Limits
-from tussle.mission.mends import mend
 from tussle.mission.problems import Place, Problems
+from tussle.mission.repairs import repair
 
 NAMESPACE_END = "}"
 ATTRIBUTE = re.compile(rb"\s+([^\s=<>/]+)\s*=\s*(?:\"[^\"]*\"|'[^']*')")
@@ -196,7 +196,7 @@ def parse(
         file: Its name, for messages.
         budget: Limits that it shares with the mission's other files.
         line_of: Maps a line of `text` to the line of the original file.
-        problems: Receives what was mended in a text that is not well-formed; None to mend nothing.
+        problems: Receives what was repaired in a text that is not well-formed; None to repair nothing.
 
     Returns:
         The root tag, and the text, well-formed.
@@ -208,16 +208,16 @@ def parse(
         return _parsed(text, file, budget, line_of), text
     except _MalformedError as error:
         first = str(error)
-        mended, changes = mend(text) if problems is not None else (text, [])
+        well_formed, changes = repair(text) if problems is not None else (text, [])
         if problems is None or not changes:
             raise MissionError(first) from None
     try:
-        root = _parsed(mended, file, budget, line_of)
+        root = _parsed(well_formed, file, budget, line_of)
     except _MalformedError as error:  # one of the two is the cause
         raise MissionError("\n".join(dict.fromkeys((first, str(error))))) from None
     for line, why, repaired in changes:
-        problems.mended(Place(file, line_of(line)), f"this is not well-formed XML: {why}", repaired)
-    return root, mended
+        problems.note_repair(Place(file, line_of(line)), f"this is not well-formed XML: {why}", repaired)
+    return root, well_formed
 
 
 class _MalformedError(Exception):

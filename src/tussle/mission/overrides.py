@@ -7,12 +7,12 @@ from typing import Any
 
 from tussle.api.plugin import Plugin
 from tussle.declare.texts import shown
-from tussle.errors import MissionError, ParameterError, TussleError, listed, nearest_name
+from tussle.errors import MissionError, ParameterError, TussleError, clipped, listed, nearest_name
 from tussle.mission import codecs
 from tussle.mission.catalogue import Catalogue
 from tussle.mission.entities import block_names
 from tussle.mission.node import Node
-from tussle.mission.paths import follow
+from tussle.mission.paths import resolve
 from tussle.mission.plugin_tags import free_name
 from tussle.mission.spec import RUN
 from tussle.mission.tags import ENTITY, PLUGIN
@@ -60,11 +60,11 @@ class TreeEditor:
         """
         if "." not in path:
             raise MissionError(
-                f"the mission has no setting {path[:80]!r}{nearest_name(path[:80], self.known)}; {listed(self.known)}; "
+                f"the mission has no setting {clipped(path)!r}{nearest_name(path, self.known)}; {listed(self.known)}; "
                 f"allowed are also paths: run.dt, BLOCK.TAG, BLOCK.PLUGIN.ATTRIBUTE, PLUGIN.ATTRIBUTE"
             )
         try:
-            owners, name = follow(path, self.root, self._inside, self._values)
+            owners, name = resolve(path, self.root, self._inside, self._values)
             owner = owners[-1]
             text = codecs.written(value, *self._units(owner, name))
             if owner.tag == "run" and owner not in self.root.children:
@@ -79,7 +79,7 @@ class TreeEditor:
                 _write_inner(outer)
         except TussleError as error:
             reason = str(error).removeprefix(f"{shown(path)}: ")
-            raise MissionError(f"setting {path[:200]}={str(value)[:80]}: {reason}") from None
+            raise MissionError(f"setting {clipped(path, 200)}={clipped(str(value))}: {reason}") from None
         return text
 
     def _inside(self, node: Node) -> dict[str, Node]:

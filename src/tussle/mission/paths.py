@@ -13,11 +13,11 @@ from typing import Any, NamedTuple
 from tussle.api.plugin import RESERVED, Plugin
 from tussle.declare.columns import Param
 from tussle.declare.texts import shown
-from tussle.errors import ParameterError, TussleError, listed, nearest_name
+from tussle.errors import ParameterError, TussleError, clipped, listed, nearest_name
 from tussle.mission.spec import BLOCK_VALUES, MISSION_VALUES, RUN, Block, Mission
 
 
-def follow(
+def resolve(
     path: str,
     start: Any,
     inside: Callable[[Any], Mapping[str, Any]],
@@ -54,7 +54,7 @@ def follow(
 
 def _absent(path: str, owner: str, name: str, known: Collection[str]) -> ParameterError:
     return ParameterError(
-        f"{shown(path)}: {owner[:80]} has no {name[:80]!r}{nearest_name(name[:80], known)}; {listed(known)}"
+        f"{shown(path)}: {clipped(owner)} has no {clipped(name)!r}{nearest_name(name, known)}; {listed(known)}"
     )
 
 
@@ -105,7 +105,7 @@ def with_value(mission: Mission, path: str, value: Any) -> Mission:
         ParameterError: The path does not exist, or the value is not allowed.
         MissionError: The mission is invalid with this value.
     """
-    owners, name = follow(path, MissionRoot(mission), inside, settable)
+    owners, name = resolve(path, MissionRoot(mission), inside, settable)
     try:
         new = owners[-1].replace(**{name: value})
     except TussleError as error:

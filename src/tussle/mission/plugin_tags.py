@@ -19,7 +19,7 @@ from tussle.mission.node import Budget, Node
 from tussle.mission.problems import Place, Problems
 from tussle.mission.tags import PLUGIN
 
-MOST_NESTED = 4
+MAX_NESTED = 4
 """Maximum nesting of behaviors."""
 LOOP_RATE = Param(0.0, unit="1/s", ge=0.0, lt=math.inf)
 RATED = ("autonomy", "controller", "sensor", "behaviors")
@@ -74,6 +74,7 @@ class PluginReader:
         unread: Tags of <param_common> that a plugin does not read: place and name -> the arguments of `Problems.unknown`.
         read: Place and name of those that a plugin reads.
         has_found: Whether attributes were added to tags, since they name files that were found.
+        plays: Whether other plugins may stand in for those of the tags, since the mission is to be played.
     """
 
     catalogue: Catalogue
@@ -86,6 +87,7 @@ class PluginReader:
     unread: dict[tuple[Place, str], tuple[Place, str, str, list[str]]] = field(default_factory=dict)
     read: set[tuple[Place, str]] = field(default_factory=set)
     has_found: bool = False
+    plays: bool = True
 
     def many(self, nodes: Iterable[Node], taken: set[str] | None = None) -> list[Any]:
         """Make the plugins of several tags; tags with errors are left out.
@@ -135,6 +137,18 @@ class PluginReader:
         except TussleError as error:
             self.problems.error(written.where(""), str(error))
             return None
+
+    def faster(self, plugin: Plugin | None, written: PluginTag, is_moving: bool) -> Plugin | None:
+        """Return the plugin that stands in for that of a tag, if there is one; it has its name. `is_moving` as of `Plugin.stand_in`."""
+        if plugin is None or not self.plays:
+            return plugin
+        name, values, note = plugin.stand_in(is_moving)
+        if note:
+            self.problems.note(written.where(""), f"{written.plugin} {note}")
+        if not name:
+            return plugin
+        states = written.attributes.get("states")
+        return self.catalogue.load(name)(name=plugin.instance_name, rate=plugin.rate, states=states, **values)
 
     def _class_of(self, written: PluginTag) -> type[Plugin] | None:
         place, tag = written.where(""), "behavior" if written.tag == "behaviors" else written.tag
@@ -241,8 +255,8 @@ class PluginReader:
             if parameter in cls.historic_attributes.least_zero and text.strip().startswith("-"):
                 text = "0"
             return cls.params()[parameter].convert(text, from_geodetic=self.from_geodetic)
-        if depth >= MOST_NESTED:
-            raise MissionError(f"plugins are nested more than {MOST_NESTED} deep")
+        if depth >= MAX_NESTED:
+            raise MissionError(f"plugins are nested more than {MAX_NESTED} deep")
         place = written.where(parameter)
         taken: set[str] = set()
         column = cls.children()[parameter]
@@ -267,7 +281,7 @@ class PluginReader:
                 repaired = " ".join(codecs.inline_text(*plugin) for plugin in found)
             except TussleError:
                 raise error from None
-            self.problems.mended(place, str(error), repaired)
+            self.problems.note_repair(place, str(error), repaired)
             return found
 
     def _not_a_parameter(self, written: PluginTag, cls: type[Plugin], attribute: str) -> None:

@@ -6,15 +6,15 @@ from collections.abc import Collection, Iterable
 from itertools import islice
 from typing import NamedTuple
 
-from tussle.declare.texts import LONGEST_SHOWN, shown
+from tussle.declare.texts import shown
 from tussle.errors import MissionError, listed, nearest_name
 
-MOST_LINES = 100
+MAX_LINES = 100
 """Maximum number of errors, and of notes; a file with more is most likely not a mission."""
 
-LONGEST_REPAIRED = 200
+MAX_REPAIRED = 200
 """Characters of a repaired line in a message."""
-MOST_GUESSED = 1000
+MAX_GUESSED = 1000
 """Maximum number of names that are searched for the nearest one."""
 
 
@@ -55,7 +55,7 @@ class Problems:
         self._absent: dict[tuple[str, str], str] = {}
         self._unknown: dict[tuple[str, str], tuple[str, str]] = {}
         self._has_unknown = False
-        self._mended: dict[str, tuple[str, list[Place]]] = {}
+        self._repairs: dict[str, tuple[str, list[Place]]] = {}
 
     def error(self, place: Place, text: str) -> None:
         """Add an error: the mission cannot be run.
@@ -64,22 +64,22 @@ class Problems:
             MissionError: There are too many errors.
         """
         self._errors.setdefault(text, []).append(place)
-        if len(self._errors) >= MOST_LINES:
+        if len(self._errors) >= MAX_LINES:
             self._errors["reading stopped here; there may be more errors"] = [place]
             self.check()
 
     def absent(self, place: Place, what: str, name: str, known: Collection[str]) -> None:
         """Add an error about a name that the file does not define. The slow search for the nearest name is done once per name."""
         if (what, name) not in self._absent:
-            some = list(islice(known, MOST_GUESSED))
+            some = list(islice(known, MAX_GUESSED))
             more = ", ..." if len(known) > len(some) else ""
-            guess = nearest_name(name[:LONGEST_SHOWN], some)
+            guess = nearest_name(name, some)
             self._absent[what, name] = f"there is no {what} {shown(name)}{guess}; {listed(some)}{more}"
         self.error(place, self._absent[what, name])
 
     def note(self, place: Place, text: str) -> None:
         """Add a note, a message about the file that is not an error."""
-        if len(self._notes) < MOST_LINES or text in self._notes:
+        if len(self._notes) < MAX_LINES or text in self._notes:
             self._notes.setdefault(text, []).append(place)
         else:
             self._n_omitted += 1
@@ -88,12 +88,12 @@ class Problems:
         self, place: Place, what: str, name: str, allowed: Iterable[str], *, lists: bool = False
     ) -> None:
         """Add an error about an unknown tag or attribute; a note if the reading is lenient and the file has it."""
-        if not self.strictness.is_strict and len(self._notes) >= MOST_LINES:
+        if not self.strictness.is_strict and len(self._notes) >= MAX_LINES:
             self._n_omitted += 1  # skips the search for the nearest name, which is slow
             return
         if (what, name) not in self._unknown:
             known = sorted(allowed)
-            text = f"{what} {shown(name)} is unknown{nearest_name(name[:LONGEST_SHOWN], known)}"
+            text = f"{what} {shown(name)} is unknown{nearest_name(name, known)}"
             self._unknown[what, name] = text, listed(known)
         text, allowed_names = self._unknown[what, name]
         if self.strictness.is_strict or not place.line:
@@ -103,7 +103,7 @@ class Problems:
             self._has_unknown = True
             self.note(place, f"{text}; it is ignored")
 
-    def mended(self, place: Place, what: str, repaired: str) -> None:
+    def note_repair(self, place: Place, what: str, repaired: str) -> None:
         """Add what is wrong but has a meaning in SCRIMMAGE: an error, or a note if the reading is lenient and the file has it.
 
         Args:
@@ -114,12 +114,12 @@ class Problems:
         if not place.line:
             self.error(place, what)
             return
-        self._mended.setdefault(what, (repaired, []))[1].append(place)
+        self._repairs.setdefault(what, (repaired, []))[1].append(place)
 
     def _mends(self, text: str) -> dict[str, list[Place]]:
         return {
-            f"{what}; {text} {shown(repaired, LONGEST_REPAIRED)}": places
-            for what, (repaired, places) in islice(self._mended.items(), MOST_LINES)
+            f"{what}; {text} {shown(repaired, MAX_REPAIRED)}": places
+            for what, (repaired, places) in islice(self._repairs.items(), MAX_LINES)
         }
 
     @property
@@ -145,7 +145,7 @@ class Problems:
         if not errors:
             return
         why = [self.strictness.reason] if self._has_unknown and is_strict else []
-        if self._mended and is_strict and self.strictness.reason:
+        if self._repairs and is_strict and self.strictness.reason:
             why.append("--lenient (strict=False) reads what is malformed as SCRIMMAGE does, with a note")
         raise MissionError("\n".join([*_lines(errors), *filter(None, why)]))
 

@@ -19,7 +19,7 @@ from tussle.world.rays.mesh_parts import read_parts
 from tussle.world.scene import Cuboid, FlatGround, HeightField, Origin, Prism, TriangleMesh, Volume
 
 SCENE_TAGS = ("terrain", "ground", "wall", "building")
-MOST_WALLS = 20_000
+MAX_WALLS = 20_000
 TERRAIN = {"position": "m", "scale": "", "cell": "m", "height": "m", "texture": ""}
 WALL = {"center": "m", "lengths": "m", "rpy": "rad"}
 BUILDING = {"corners": "m", "low": "m", "high": "m"}
@@ -44,9 +44,9 @@ class SceneReader:
         """Return ground, walls, terrain and meshes, as arguments of `Scene`."""
         grounds = self._each("ground", (), lambda node, _: FlatGround(codecs.number(node.text, "m")))
         walls: list[Volume] = [*self._each("wall", WALL, _wall), *self._each("building", BUILDING, _building)]
-        if len(walls) > MOST_WALLS:
+        if len(walls) > MAX_WALLS:
             self.problems.error(
-                self.root.place, f"there are {len(walls):,} walls and buildings; the limit is {MOST_WALLS:,}"
+                self.root.place, f"there are {len(walls):,} walls and buildings; the limit is {MAX_WALLS:,}"
             )
         surfaces = self._each("terrain", TERRAIN, self._surface)
         fields = [each for each in surfaces if isinstance(each, HeightField)]

@@ -55,7 +55,7 @@ def find_mission(source: str | Path, search: Sequence[str | Path] = ()) -> Path:
     is_folder = os.path.isdir(path)  # noqa: PTH112  Path.is_dir raises for names that are too long
     why = "is a folder, not a mission file" if is_folder else "is neither a file nor a shipped mission"
     raise MissionError(
-        f"{shown(str(source))} {why}{nearest_name(path.stem[:80], [*shipped, *stock.examples()])}; of shipped missions {listed(shipped)}"
+        f"{shown(str(source))} {why}{nearest_name(path.stem, [*shipped, *stock.examples()])}; of shipped missions {listed(shipped)}"
     )
 
 

@@ -34,9 +34,9 @@ OF_WORLD = ("interactions", "metrics", "networks")
 """Names of the plugins of a block, and of a mission."""
 UPDATES = ("synchronous", "sequential", "random", "random_in_blocks")
 ONE_BY_ONE = UPDATES[1:]
-"""Those in which entities decide and move one after another."""
+"""Update orders in which entities decide and move one after another."""
 SHUFFLED = UPDATES[2:]
-"""Those with another order of the entities in each step, which take one world at a time."""
+"""Update orders that are drawn anew in each step; they take one world at a time."""
 PLACEMENTS = ("normal", "uniform")
 WITHOUT_SPACE = ("wait", "fail")
 
@@ -229,15 +229,15 @@ class Block:
         return displayed.block_html(self)
 
 
-FARTHEST = 1e9
+MAX_COORDINATE = 1e9
 """Largest coordinate of a block [m]: positions there are good to a micrometre, so that entities still move."""
 BLOCK_VALUES = _declared(
     Block,
     team={},
     count={"ge": 0},
-    position={"unit": "m", "fields": "x y z", "ge": -FARTHEST, "le": FARTHEST},
-    variance={"unit": "m^2", "fields": "x y z", "ge": 0.0, "le": FARTHEST**2},
-    half_width={"unit": "m", "fields": "x y z", "ge": 0.0, "le": FARTHEST},
+    position={"unit": "m", "fields": "x y z", "ge": -MAX_COORDINATE, "le": MAX_COORDINATE},
+    variance={"unit": "m^2", "fields": "x y z", "ge": 0.0, "le": MAX_COORDINATE**2},
+    half_width={"unit": "m", "fields": "x y z", "ge": 0.0, "le": MAX_COORDINATE},
     placement={"choices": PLACEMENTS},
     scatter_first={},
     heading={"unit": "rad", "text_unit": "deg"},

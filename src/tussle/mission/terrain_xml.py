@@ -23,7 +23,7 @@ TAGS = (
 )  # fmt: skip
 OFFSETS = ("origin_offset_x", "origin_offset_y", "origin_offset_z")
 CENTRAL_SCALE, FALSE_EASTING, FALSE_NORTHING = 0.9996, 500_000.0, 10_000_000.0
-"""Of UTM: NGA.SIG.0012, The Universal Grids and the Transverse Mercator and Polar Stereographic Map Projections (2014), section 7."""
+"""UTM: NGA.SIG.0012, The Universal Grids and the Transverse Mercator and Polar Stereographic Map Projections (2014), section 7."""
 
 
 def utm(origin: Origin, zone: int, is_south: bool) -> tuple[float, float]:

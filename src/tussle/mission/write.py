@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import re
 from collections.abc import Iterator, Sequence
 from typing import Any
 
@@ -23,6 +24,9 @@ from tussle.plugins import stock
 from tussle.world.scene import Base, Cuboid, HeightField, Prism, Scene, TriangleMesh
 
 NOWHERE = Place("", 0)
+SEED_TAG = re.compile(r"<!--.*?-->|(?P<head><seed(?:\s[^<>]*?)?)(?:/>|>[^<]*</seed\s*>)", re.DOTALL)
+"""A comment, or the tag of the seed."""
+ROOT_TAG = re.compile(r"<runscript\b[^<>]*>")
 HISTORIC = "tussle.plugins.historic."
 PUBLIC = {
     "tussle.plugins.stock.": "tussle.stock",
@@ -56,6 +60,17 @@ TAGS = {
     "without_space": "generate_without_space",
 }
 """Values of a block that are one tag each."""
+
+
+def with_seed(text: str, seed: int) -> str:
+    """The text of a mission file with this seed in place of its own; where it has none, behind the root tag, unless that is 1."""
+    tags = [found for found in SEED_TAG.finditer(text) if found["head"]]
+    if tags:
+        found = tags[0]
+        return f"{text[: found.start()]}{found['head']}>{seed}</seed>{text[found.end() :]}"
+    return (
+        text if seed == 1 else ROOT_TAG.sub(lambda root: f"{root[0]}\n  <seed>{seed}</seed>", text, count=1)
+    )
 
 
 def to_xml(mission: GivenMission, seed: int | None = None) -> str:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from tussle.declare.texts import shown, truth
-from tussle.errors import MissionError, ParameterError, TussleError
+from tussle.errors import MissionError, ParameterError, TussleError, clipped
 from tussle.mission import codecs
 from tussle.mission.catalogue import KINDS, Catalogue
 from tussle.mission.data_files import DataFiles, data_folders
@@ -95,6 +95,7 @@ def read_mission(
     allow_large: bool = False,
     compat: str | None = None,
     checks_effects: bool = True,
+    plays: bool = True,
 ) -> Loaded:
     """Read a mission.
 
@@ -112,6 +113,8 @@ def read_mission(
         compat: As for `Mission`; None for the value in the file.
         checks_effects: It is an error if an override has no effect, since its placeholder stands only in what is ignored. For this
             check the mission is read once more for each override.
+        plays: The mission is to be played. Otherwise, to be looked at, each plugin is that of its tag, and nothing but files of missions
+            is read: no plugin is tried, as an aircraft is in JSBSim that may fly compiled instead.
 
     Raises:
         MissionError: The mission cannot be read or is invalid. The message has one line for each error, with file and line.
@@ -120,7 +123,7 @@ def read_mission(
     search = data_folders(search)
 
     def read(given: Mapping[str, Any]) -> Loaded:
-        return _read(source, given, strict, plugin_files, search, limits, compat)
+        return _read(source, given, strict, plugin_files, search, limits, compat, plays)
 
     given = {str(name): value for name, value in (overrides or {}).items()}
     loaded = read(given)
@@ -137,6 +140,7 @@ def _read(
     search: Sequence[str | Path],
     limits: Limits,
     compat: str | None,
+    plays: bool,
 ) -> Loaded:
     budget = Budget(limits)
     settings = as_texts(given)
@@ -145,7 +149,7 @@ def _read(
     read = SourceReader(settings, problems, budget, search).read(path)
     if read.root.tag != "runscript":
         raise MissionError(
-            f"{read.root.place}: the root tag is <{read.root.tag[:80]}>; it must be <runscript>"
+            f"{read.root.place}: the root tag is <{clipped(read.root.tag)}>; it must be <runscript>"
         )
     files = tuple(f if isinstance(f, PluginFile) else PluginFile.of(f) for f in plugin_files)
     catalogue = _catalogue(read, compat, files)
@@ -156,7 +160,7 @@ def _read(
     paths = {name: tree.set(name, value) for name, value in given.items() if name not in read.placeholders}
     if paths:
         read.text = read.root.to_text()
-    reader = _WorldReader(read, catalogue, problems, budget, [path.parent, *map(Path, search)])
+    reader = _WorldReader(read, catalogue, problems, budget, [path.parent, *map(Path, search)], plays)
     return replace(reader.loaded(), settings=settings | paths, plugin_files=files)
 
 
@@ -188,8 +192,9 @@ class _WorldReader:
         problems: Problems,
         budget: Budget,
         folders: list[Path],
+        plays: bool,
     ) -> None:
-        self.source, self.folders = source, folders
+        self.source, self.folders, self.plays = source, folders, plays
         self.catalogue = catalogue
         self.problems = problems
         self.budget, self.limits = budget, budget.limits
@@ -211,7 +216,13 @@ class _WorldReader:
         origin = self._origin()
         find = DataFiles(self.folders[0], self.folders[1:]).find
         plugins = PluginReader(
-            self.catalogue, problems, self.budget, find, self._shared(), origin.from_geodetic
+            self.catalogue,
+            problems,
+            self.budget,
+            find,
+            self._shared(),
+            origin.from_geodetic,
+            plays=self.plays,
         )
         world = self._world_plugins(plugins)
         scene = SceneReader(root, self.folders, origin, problems)
@@ -314,7 +325,7 @@ class _WorldReader:
         if value < 1.0 or value == int(value):
             return codecs.integer(text, 1, most)
         whole = codecs.integer(str(int(value)), 1, most)
-        self.problems.mended(
+        self.problems.note_repair(
             fields.place("motion_multiplier"), f"motion_multiplier: {shown(text)} is not a whole number", f'motion_multiplier="{whole}"'
         )  # fmt: skip
         return whole

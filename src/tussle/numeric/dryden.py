@@ -92,7 +92,7 @@ MIL-F-8785C section 3.7.3.4, in feet: L_w = h, L_u = L_v = h / (0.177 + 0.000823
 sd_u = sd_v = sd_w / (0.177 + 0.000823 h)^0.4; from height above the ground [m], held between 10 and 1000 ft, and wind speed at 20 ft [m/s].
 """
 any_altitude = Columnar(_any_altitude, (0, 0, 0), 4)
-"""As `low_altitude`; above 2000 ft all scales are 1750 ft and all deviations the third argument [m/s], and between they change linearly."""
+"""Like `low_altitude`; above 2000 ft all scales are 1750 ft and all deviations the third argument [m/s], with a linear transition."""
 at_start = Columnar(_at_start, (5,), 5)
 """Filter states in the stationary distribution, (5, n), from standard normal draws, (5, n)."""
 passed = Columnar(_passed, (5, 0, 0, 5), 5)

@@ -88,11 +88,10 @@ class Fingerprint:
         self._visit(function.__defaults__, frozenset())
         self._write(repr(sorted(function.__kwdefaults__ or ())))
         self._visit(tuple((function.__kwdefaults__ or {}).values()), frozenset())
-        names = frozenset(names_of(code))
-        for name in sorted(names):
-            if name in function.__globals__:
-                self._write("global", name)
-                self._visit(function.__globals__[name], names)
+        names = names_of(code)
+        for name in sorted(names & function.__globals__.keys()):
+            self._write("global", name)
+            self._visit(function.__globals__[name], names)
         for name, cell in zip(code.co_freevars, function.__closure__ or (), strict=True):
             self._write("cell", name)
             try:
@@ -108,10 +107,9 @@ class Fingerprint:
         # Visits every name of the function that is an attribute of the module, even if the function reads it elsewhere. This may
         # visit too many objects, but never too few.
         self._write("module", module.__name__)
-        for name in sorted(names):
-            if name in vars(module):
-                self._write("attribute", name)
-                self._visit(vars(module)[name], names)
+        for name in sorted(names & vars(module).keys()):
+            self._write("attribute", name)
+            self._visit(vars(module)[name], names)
 
     def _visit_other(self, value: Any) -> None:
         name = f"{getattr(value, '__module__', '')}.{getattr(value, '__qualname__', getattr(value, '__name__', ''))}"
@@ -158,10 +156,10 @@ def codes_of(code: types.CodeType) -> Iterator[types.CodeType]:
             yield from codes_of(value)
 
 
-def names_of(code: types.CodeType) -> Iterator[str]:
-    """Yield all global and attribute names in the code."""
-    for each in codes_of(code):
-        yield from each.co_names
+@cache
+def names_of(code: types.CodeType) -> frozenset[str]:
+    """All global and attribute names in the code."""
+    return frozenset(name for each in codes_of(code) for name in each.co_names)
 
 
 @cache

@@ -11,6 +11,7 @@ import numpy as np
 
 from tussle.numeric import elementary
 from tussle.numeric.kernel import Device, Kernel, kernel
+from tussle.numeric.source import define
 
 
 def kernel_over_columns(scalar: Device, sizes: Sequence[int], n_out: int) -> Kernel:
@@ -24,14 +25,12 @@ def kernel_over_columns(scalar: Device, sizes: Sequence[int], n_out: int) -> Ker
     names = [f"input_{k}" for k in range(len(sizes))]
     values = [f"{name}[{row}, i]" for name, size in zip(names, sizes, strict=True) for row in range(size)]
     results = [f"out[{row}, i]" for row in range(n_out)]
-    scope: dict[str, Any] = {"scalar": scalar}
-    exec(  # noqa: S102 - the text consists of the names above
-        f"def columns({', '.join(names)}, out):\n    for i in range(out.shape[1]):\n"
-        f"        {', '.join(results)} = scalar({', '.join(values)})\n",
-        scope,
-    )
-    columns = scope["columns"]
-    columns.__module__, columns.__qualname__ = scalar.__module__, f"{scalar.__qualname__}_columns"
+    lines = [
+        f"def columns({', '.join(names)}, out):",
+        "    for i in range(out.shape[1]):",
+        f"        {', '.join(results)} = scalar({', '.join(values)})",
+    ]
+    columns = define(lines, {"scalar": scalar}, scalar.__module__, f"{scalar.__qualname__}_columns")
     return kernel(" ".join([*["F2"] * len(sizes), "F2w"]))(columns)
 
 

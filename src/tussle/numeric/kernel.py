@@ -162,14 +162,18 @@ class Device:
 
     Args:
         function: The Python function, available as `py_func`.
+        options: Compiler options that differ from those of the class; None leaves one out.
     """
 
     options: ClassVar[dict[str, Any]] = {"error_model": "numpy", "forceinline": True}
     __name__: str
     __qualname__: str
 
-    def __init__(self, function: Callable[..., Any]) -> None:
+    def __init__(self, function: Callable[..., Any], **options: Any) -> None:
         self.py_func = function
+        if options:
+            chosen = {**self.options, **options}
+            self.options = {name: value for name, value in chosen.items() if value is not None}  # type: ignore[misc]
         self._dispatcher: Any = None
         self._for_python: Any = None
         self._digest = ""
@@ -213,52 +217,17 @@ def device(function: Callable[..., Any]) -> Any:
     return Device(function)
 
 
-def routine(function: Callable[..., Any]) -> Any:
-    """Decorator for a larger function that kernels call; it is compiled once for each kernel, which takes less time to compile."""
-    return Routine(function)
-
-
-class Routine(Device):
-    """A larger function that kernels call; compiled once for each kernel, not into each of its callers.
-
-    Args:
-        function: The Python function, available as `py_func`.
-    """
-
-    options: ClassVar[dict[str, Any]] = {"error_model": "numpy"}
-
-
 def lean_device(function: Callable[..., Any]) -> Any:
     """Like `device`, for functions that create no arrays: compiled without counting references to those that they get.
 
     Where such a function has branches, the compiler does not remove the counting: two atomic operations for each array and call.
     """
-    return LeanDevice(function)
+    return Device(function, _nrt=False)
 
 
 def lean_routine(function: Callable[..., Any]) -> Any:
-    """Like `routine`, for functions that create no arrays; see `lean_device`."""
-    return LeanRoutine(function)
-
-
-class LeanDevice(Device):
-    """A small function that creates no arrays.
-
-    Args:
-        function: The Python function, available as `py_func`.
-    """
-
-    options: ClassVar[dict[str, Any]] = {**Device.options, "_nrt": False}
-
-
-class LeanRoutine(Routine):
-    """A larger function that creates no arrays.
-
-    Args:
-        function: The Python function, available as `py_func`.
-    """
-
-    options: ClassVar[dict[str, Any]] = {**Routine.options, "_nrt": False}
+    """Like `lean_device`, for larger functions: compiled once for each kernel, not into each caller, which takes less time."""
+    return Device(function, forceinline=None, _nrt=False)
 
 
 class Kernel(Device):

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from tussle.errors import DeclarationError, listed, nearest_name
 from tussle.numeric.address import caller
 from tussle.numeric.kernel import Device, Kernel, device, is_interpreted, kernel
+from tussle.numeric.source import define
 
 Floats = NDArray[np.float64]
 DERIVATIVE = "Fw Fw Fw Fw"  # x (m,), u (k,), p (q,), dx (m,)
@@ -67,14 +68,10 @@ def compile_derivative(
             )
     targets = ", ".join(f"dx[{place}]" for place in range(len(x_names)))
     values = ", ".join(f"{name}={where[name]}" for name in arguments)
-    scope: dict[str, Any] = {
-        "function": function if isinstance(function, (Device, Kernel)) else device(function)
-    }
-    exec(f"def derivative(x, u, p, dx):\n    {targets} = function({values})\n", scope)  # noqa: S102 - the text contains only checked names
-    wrapper = scope["derivative"]
-    wrapper.__module__ = function.__module__
-    wrapper.__qualname__ = f"{function.__qualname__}.wrapper"
-    wrapper.states = tuple(x_names)
+    scope = {"function": function if isinstance(function, (Device, Kernel)) else device(function)}
+    lines = ["def derivative(x, u, p, dx):", f"    {targets} = function({values})"]
+    wrapper = define(lines, scope, function.__module__, f"{function.__qualname__}.wrapper")
+    wrapper.states = tuple(x_names)  # type: ignore[attr-defined]
     return kernel(DERIVATIVE)(wrapper)
 
 

@@ -13,6 +13,7 @@ from tussle.numeric.address import caller
 from tussle.numeric.fingerprint import package
 from tussle.numeric.kernel import Device, device, kernel
 from tussle.numeric.rk4 import label
+from tussle.numeric.source import define, indented
 
 BLOCK = 128
 """Rows per block: the values of a block fit into the first-level cache."""
@@ -124,13 +125,11 @@ class RowKernel:
             else:
                 own = call.function
                 scope[f"call_{place}"] = own if isinstance(own, Device) else device(own)
-        text = [f"def row_kernel({arguments}):", *self._lines(given, kept, rows, times)]
-        exec("\n".join(text) + "\n", scope)  # noqa: S102 - the text is written here; code of plugins is only called
-        made = scope["row_kernel"]
+        lines = [f"def row_kernel({arguments}):", *self._lines(given, kept, rows, times)]
         # A kernel with a function of a plugin author belongs to the author's module, and so may run as Python.
-        made.__module__ = next((f for f in functions if package(f) != "tussle"), functions[0]).__module__
-        made.__qualname__ = "+".join(dict.fromkeys(f.__qualname__ for f in functions))
-        self.kernel = kernel(signature)(made)
+        module = next((f for f in functions if package(f) != "tussle"), functions[0]).__module__
+        name = "+".join(dict.fromkeys(f.__qualname__ for f in functions))
+        self.kernel = kernel(signature)(define(lines, scope, module, name))
 
     def _text(self, value: Value) -> str:
         """Return the source text of an argument or result."""
@@ -165,8 +164,9 @@ class RowKernel:
             yield "            for l in range(m):"
             yield f"                column[start + l] = {self._text(number)}"
         yield f"            call_{place}({', '.join(call.kernel)}, start, start + m, {call.after})"
-        for line in self._copies(call.state, call.results, "work[{line} + k, l] = column[start + l]"):
-            yield f"    {line}"
+        yield from indented(
+            1, self._copies(call.state, call.results, "work[{line} + k, l] = column[start + l]")
+        )
 
     def _copies(self, name: str, numbers: Sequence[Number], copy: str) -> Iterator[str]:
         if not numbers:

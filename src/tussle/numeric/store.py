@@ -25,7 +25,7 @@ from tussle.folders import is_private, lock, open_safely, read_own, user_folder
 KEEP = 8  # files per kernel: a few variants of the code and of the processor settings that tests use
 SHIPPED = Path(__file__).with_name("shipped")
 """Kernels that came with the package: a wheel has those of its missions, see hatch_build.py."""
-TOUCH_AFTER = (
+TOUCH_TIME = (
     86400.0  # [s] the time stamp of a used file is renewed once a day, so that unused files are removed first
 )
 
@@ -86,7 +86,7 @@ def load(name: str, key: str) -> Any:
     path = directory() / file_name
     try:
         content, written = read_own(path)
-        if time.time() - written > TOUCH_AFTER:
+        if time.time() - written > TOUCH_TIME:
             os.utime(path)
     except OSError:
         content = b""

@@ -11,15 +11,29 @@ from tussle.record.state_hash import hash_columns
 
 if TYPE_CHECKING:
     from tussle.record.first_states import FirstStates, read_table
+    from tussle.record.input_table import load_inputs
+    from tussle.record.inputs import ExternalInput
     from tussle.record.recorder import Recorder
     from tussle.record.run import Run, load_run
 
-__all__ = ["Events", "FirstStates", "Recorder", "Run", "hash_columns", "load_run", "read_table"]
+__all__ = [
+    "Events",
+    "ExternalInput",
+    "FirstStates",
+    "Recorder",
+    "Run",
+    "hash_columns",
+    "load_inputs",
+    "load_run",
+    "read_table",
+]
 
 _LAZY = {
     "FirstStates": "first_states",
+    "ExternalInput": "inputs",
     "Recorder": "recorder",
     "Run": "run",
+    "load_inputs": "input_table",
     "load_run": "run",
     "read_table": "first_states",
 }

@@ -19,9 +19,9 @@ import pyarrow as pa
 from tussle.checksums import BLANK, N_DIGITS, as_digits, crc_of_part, crc_of_zeros, find_seal, sealed
 from tussle.documents import size_of
 
-MOST_HEAD = 1 << 24
+MAX_HEAD = 1 << 24
 """Maximum size of a message's metadata [B]."""
-MOST_BODY = 1 << 29
+MAX_BODY = 1 << 29
 """Maximum size of a message's body [B]; tussle writes about 5 MB at a time."""
 SCHEMA, DICTIONARY, BATCH = 1, 2, 3
 """Message types, from Arrow's Message.fbs."""
@@ -29,12 +29,12 @@ END_MARK = struct.pack("<Ii", 0xFFFFFFFF, 0)
 KEY = "checksum"
 """Name of the metadata entry that holds the checksum of a block."""
 CHUNK = 1 << 20
-MOST_SEARCHED = 128_000_000
-"""Bytes behind a damaged block that are searched for the next intact one, far more than a block has: a file may seem enormous."""
+MAX_SEARCHED = 128_000_000
+"""Number of bytes behind a damaged block in which the next intact one is searched, far more than a block has: a file may seem enormous."""
 MAX_SEARCH = 8
 """Bytes that the search for intact blocks behind damaged ones may read, per byte of the file: a file can be made to be slow to search."""
 _START = re.compile(rb"\xff{4}(?=[\s\S]{3}\x00)")
-"""Beginning of a message whose metadata is not longer than MOST_HEAD."""
+"""Beginning of a message whose metadata is not longer than MAX_HEAD."""
 
 
 class InvalidStreamError(Exception):
@@ -189,7 +189,7 @@ class _Search:
 
     def next_intact(self, file: BinaryIO, at: int, size: int) -> int | None:
         """Position of the first intact block from a position on; None if there is none."""
-        end = min(size, at + MOST_SEARCHED)
+        end = min(size, at + MAX_SEARCHED)
         while at < end:
             file.seek(at)
             chunk = file.read(CHUNK + 7)
@@ -242,9 +242,9 @@ def _block(file: BinaryIO, start: int, size: int) -> StreamBlock | None:
             return StreamBlock(start, at, DICTIONARY, None)
         if mark != 0xFFFFFFFF:
             raise _NoMessageError("it is not an Arrow stream")
-        if _is_within(length, MOST_HEAD, size - at - 8):
+        if _is_within(length, MAX_HEAD, size - at - 8):
             kind, body, digits = _metadata(file.read(length), at + 8)
-            if _is_within(body, MOST_BODY, size - at - 8 - length):
+            if _is_within(body, MAX_BODY, size - at - 8 - length):
                 at += 8 + length + body
                 if kind != DICTIONARY:
                     return StreamBlock(start, at, kind, digits)

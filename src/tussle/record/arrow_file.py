@@ -16,7 +16,7 @@ from tussle.record.table_values import Rules, check_values
 
 MAX_CHECKED_MAPPED = 1 << 28
 """Maximum size of a file that is mapped into memory and whose checksums are compared [B]; a larger one is checked by `tussle check`."""
-MOST_WORDS = 1 << 26
+MAX_WORDS = 1 << 26
 """Maximum size of a dictionary column if every row held its longest entry [B]; block names take about 2 MB."""
 
 
@@ -165,8 +165,8 @@ def _check_columns(batch: pa.RecordBatch) -> None:
         if pa.types.is_dictionary(column.type):
             column.dictionary.validate(full=True)
             longest = pc.max(pc.binary_length(column.dictionary)).as_py() or 0
-            if longest * len(column) > MOST_WORDS:
+            if longest * len(column) > MAX_WORDS:
                 raise InvalidStreamError(
                     f"column {field.name!r} has {len(column):,} rows and a text of {longest:,} bytes; "
-                    f"the limit of their product is {MOST_WORDS:,} bytes"
+                    f"the limit of their product is {MAX_WORDS:,} bytes"
                 )

@@ -12,7 +12,7 @@ from tussle.record.arrow_blocks import InvalidStreamError, find_blocks
 from tussle.record.arrow_file import damage_of
 from tussle.record.run import run_directory
 from tussle.record.run_file import crc_of_file
-from tussle.record.schema import EVENTS_FILE, LINKS_FILE, RUN, RUN_FILE, SHAPES_FILE, TRAJECTORY_FILE
+from tussle.record.schema import FILES, RUN, RUN_FILE
 
 
 def damage_in_run(path: str | Path) -> tuple[list[str], list[str]]:
@@ -37,7 +37,7 @@ def damage_in_run(path: str | Path) -> tuple[list[str], list[str]]:
             info = RUN.read(place / RUN_FILE)
         except RecordError as error:
             damage.append(str(error))
-    for name in (TRAJECTORY_FILE, EVENTS_FILE, SHAPES_FILE, LINKS_FILE):
+    for name in (name for name in FILES if name.endswith(".arrow")):
         written = info.get("files", {}).get(name)
         if (place / name).exists():
             found, unknown = stream_damage(place / name)

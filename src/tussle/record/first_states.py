@@ -13,7 +13,7 @@ import pyarrow.csv
 from tussle.documents import size_of
 from tussle.errors import ParameterError, RecordError, listed
 from tussle.record.arrow_file import read_batches
-from tussle.record.parquet_file import MARGIN, MOST_EXPANSION, read_parquet
+from tussle.record.parquet_file import MARGIN, MAX_EXPANSION, read_parquet
 from tussle.record.schema import TRAJECTORY, TRAJECTORY_FILE
 
 TIME = ("t", "time")
@@ -140,7 +140,7 @@ def _read(place: Path) -> pa.Table:
             return _columns(pa.Table.from_batches(batches, None if batches else TRAJECTORY))
         if name.endswith(".parquet"):
             return read_parquet(place, pa.schema([]), RecordError, READ)
-        most = MARGIN + MOST_EXPANSION * size_of(place)
+        most = MARGIN + MAX_EXPANSION * size_of(place)
         return _columns(pyarrow.csv.read_csv(_decompressed(place, most) if name.endswith(".gz") else place))
     except (pa.ArrowException, OSError, ValueError) as error:
         raise RecordError(f"{place}: cannot be read: {error}") from error

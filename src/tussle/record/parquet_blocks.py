@@ -16,7 +16,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from tussle.checksums import BLANK, MARK, N_DIGITS, as_digits, crc_of_part, crc_with_zeros
-from tussle.record.parquet_sizes import MOST_FOOTER
+from tussle.record.parquet_sizes import MAX_FOOTER
 
 ROWS_OF_GROUP = 8192
 """Rows of a row group, rounded down to whole runs. What a damaged byte destroys is the runs of its group."""
@@ -93,9 +93,9 @@ def intact_groups(file: BinaryIO, size: int) -> tuple[list[int], int] | None:
     Raises:
         ValueError: The footer is damaged.
     """
-    tail_start = max(0, size - MOST_FOOTER)
+    tail_start = max(0, size - MAX_FOOTER)
     file.seek(tail_start)
-    tail = file.read(MOST_FOOTER)
+    tail = file.read(MAX_FOOTER)
     found = list(_ENTRY.finditer(tail))
     if not found:
         if _RESTS.search(tail):  # of an entry in which a byte is wrong
@@ -103,10 +103,10 @@ def intact_groups(file: BinaryIO, size: int) -> tuple[list[int], int] | None:
         return None
     entries = [entry for entry in found[-1][1].decode().split(",") if entry]
     ends = [0, *(int(entry[:16], 16) for entry in entries)]
-    if ends != sorted(ends) or not size - MOST_FOOTER <= ends[-1] < size:
+    if ends != sorted(ends) or not size - MAX_FOOTER <= ends[-1] < size:
         raise ValueError("its footer is damaged")
     file.seek(ends[-1])
-    footer = file.read(MOST_FOOTER)
+    footer = file.read(MAX_FOOTER)
     digits = tail_start + found[-1].start(2) - ends[-1]
     if digits < 0 or as_digits(crc_with_zeros(footer, digits)) != footer[digits : digits + N_DIGITS]:
         raise ValueError("its footer is damaged")

@@ -17,12 +17,12 @@ from tussle.record.arrow_file import same_columns
 from tussle.record.parquet_blocks import intact_groups
 from tussle.record.parquet_sizes import Sizes, sizes_of
 
-MOST_EXPANSION = 1000
+MAX_EXPANSION = 1000
 """Maximum memory for each byte of a file, in addition to MARGIN. The results of a batch repeat a run's values in each of its rows,
 which Parquet compresses about a hundredfold; a decompression bomb reaches millions."""
 MARGIN = 1 << 26
 """Memory that any table may take [B]."""
-MOST_COLUMNS = 10_000
+MAX_COLUMNS = 10_000
 AT_ONCE = 65_536
 """Rows that are decoded before their size is checked."""
 
@@ -51,7 +51,7 @@ def read_parquet(
     """
     try:
         size = size_of(path)
-        most = MARGIN + MOST_EXPANSION * size
+        most = MARGIN + MAX_EXPANSION * size
         with path.open("rb") as opened:
             groups = _intact_groups(path, opened, size, error, notes)
             sizes = sizes_of(opened, size, groups)
@@ -76,8 +76,8 @@ def read_parquet(
 
 def _columns_problem(schema: pa.Schema, names: list[str]) -> str:
     """Describe what is wrong with the columns; "" if nothing is."""
-    if len(schema) > MOST_COLUMNS or len(set(schema.names)) < len(schema):
-        return f"it has {len(schema):,} columns; at most {MOST_COLUMNS:,} with unique names are allowed"
+    if len(schema) > MAX_COLUMNS or len(set(schema.names)) < len(schema):
+        return f"it has {len(schema):,} columns; at most {MAX_COLUMNS:,} with unique names are allowed"
     other = [schema.field(name) for name in names if not _is_supported(schema.field(name).type)]
     return f"column {other[0].name!r} has type {other[0].type}, which is not supported" if other else ""
 

@@ -11,11 +11,11 @@ from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from typing import Any, BinaryIO
 
-MOST_FOOTER = 1 << 22
-MOST_PAGES = 300_000
-MOST_HEAD = 1 << 16
+MAX_FOOTER = 1 << 22
+MAX_PAGES = 300_000
+MAX_HEAD = 1 << 16
 """Maximum size of a page header [B]."""
-MOST_DEPTH = 16
+MAX_DEPTH = 16
 TRUE, FALSE, BYTE, DOUBLE, BINARY, LIST, SET, STRUCT = 1, 2, 3, 7, 8, 9, 10, 12
 ROWS, GROUPS = 3, 4
 COLUMNS, GROUP_ROWS = 1, 3
@@ -55,7 +55,7 @@ def sizes_of(file: BinaryIO, size: int, only: Collection[int] | None = None) -> 
     try:
         file.seek(max(0, size - 8))
         length, mark = struct.unpack("<I4s", file.read(8))
-        if mark != b"PAR1" or not 0 < length <= min(MOST_FOOTER, size - 8):
+        if mark != b"PAR1" or not 0 < length <= min(MAX_FOOTER, size - 8):
             raise ValueError("it is not a Parquet file")
         file.seek(size - 8 - length)
         footer, _ = _value(STRUCT, file.read(length), 0, 0)
@@ -69,8 +69,8 @@ def sizes_of(file: BinaryIO, size: int, only: Collection[int] | None = None) -> 
             for i, column in enumerate(group[COLUMNS]):
                 for n, page in _pages(file, column, size):
                     n_pages += 1
-                    if n_pages > MOST_PAGES:
-                        raise ValueError(f"it has more than {MOST_PAGES:,} pages")
+                    if n_pages > MAX_PAGES:
+                        raise ValueError(f"it has more than {MAX_PAGES:,} pages")
                     values[i] = values.get(i, 0) + n
                     found.bytes, found.largest = found.bytes + page, max(found.largest, page)
         found.values = max(values.values(), default=0)
@@ -90,7 +90,7 @@ def _pages(file: BinaryIO, column: dict[int, Any], size: int) -> Iterator[tuple[
         raise ValueError("a column lies outside the file")
     while at < end:
         file.seek(at)
-        page, length = _value(STRUCT, file.read(min(MOST_HEAD, end - at)), 0, 0)
+        page, length = _value(STRUCT, file.read(min(MAX_HEAD, end - at)), 0, 0)
         n = max((page[kind][PAGE_VALUES] for kind in PAGE_KINDS if kind in page), default=0)
         if min(n, page[PAGE_SIZE], page[PAGE_PACKED]) < 0:
             raise ValueError("a page declares a negative size")
@@ -103,7 +103,7 @@ def _pages(file: BinaryIO, column: dict[int, Any], size: int) -> Iterator[tuple[
 
 def _value(kind: int, data: bytes, at: int, depth: int) -> tuple[Any, int]:
     """Decode a value; also return the position behind it. A struct is a dict from field numbers to values."""
-    if depth > MOST_DEPTH:
+    if depth > MAX_DEPTH:
         raise ValueError("its metadata is nested too deeply")
     if kind == BYTE:
         return data[at], at + 1

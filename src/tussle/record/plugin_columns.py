@@ -80,7 +80,7 @@ def is_of_plugin(part: pa.Field) -> bool:
 
 @dataclass
 class Source:
-    """Where the values of a column come from.
+    """Source of the values of a column.
 
     Attributes:
         column: The column.

@@ -13,10 +13,14 @@ from typing import Any, Protocol, Self
 import numpy as np
 import pyarrow as pa
 
-from tussle.errors import MissionError, ParameterError, RecordError
+from tussle.documents import POSITIVE, Maybe, check_argument
+from tussle.errors import MissionError, RecordError
 from tussle.mission import PluginFile, to_xml
+from tussle.mission.write import with_seed
 from tussle.record import run_file
 from tussle.record.events import BIRTH, END, Events
+from tussle.record.input_table import batch_of
+from tussle.record.inputs import ExternalInput
 from tussle.record.plugin_columns import ColumnReader, select
 from tussle.record.plugin_copies import plugin_copies
 from tussle.record.results import ResultRows
@@ -25,6 +29,8 @@ from tussle.record.schema import (
     EVENTS,
     EVENTS_FILE,
     FILES,
+    INPUTS,
+    INPUTS_FILE,
     LINKS,
     LINKS_FILE,
     MISSION_FILE,
@@ -38,9 +44,9 @@ from tussle.record.shapes import ShapeRows
 from tussle.record.stream import Stream
 from tussle.record.traffic import Traffic, check_file_names
 
-MOST_RESULTS = 100_000
+MAX_RESULTS = 100_000
 """Changes of results that are collected between two flushes."""
-MOST_LETTERS = 4_000_000
+MAX_CHARACTERS = 4_000_000
 """Characters of shapes that are collected between two flushes."""
 
 
@@ -69,8 +75,8 @@ class Recorder:
         sim: The simulation; recording starts with its present state.
         directory: Run directory; created if it does not exist. It must not hold a run.
         period: Time between recorded states [s]; None records every step.
-        mission_text: Mission file with all its values, saved as `mission.xml`; by default the mission of the simulation is written,
-            if a mission file can hold it.
+        mission_text: Mission file with all its values, saved as `mission.xml`, of a single world with its seed; by default the mission of
+            the simulation is written, if a mission file can hold it.
         parameters: Values that were set in addition to the mission, for `run.json`.
         mission_notes: Notes about the mission file, for `run.json`, see `tussle.mission.Loaded`.
         flush_every: Wall time between flushes [s].
@@ -105,9 +111,8 @@ class Recorder:
         scene_files: Mapping[str, Path] | None = None,
         plugin_files: Sequence[PluginFile] = (),
     ) -> None:
-        for name, value in (("period", period), ("flush_every", flush_every)):
-            if value is not None and not 0.0 < value < float("inf"):
-                raise ParameterError(f"{name} = {value!r} is not allowed; it takes a number of seconds > 0")
+        check_argument("period", period, Maybe(POSITIVE))
+        check_argument("flush_every", flush_every, Maybe(POSITIVE))
         check_file_names(sim.mission.networks)
         self.sim, self.directory = sim, Path(directory)
         self.period, self.flush_every = period, flush_every
@@ -125,6 +130,8 @@ class Recorder:
         recorded = [source.column for source in self._columns.sources]
         self._buffer = RowBuffer([b.name for b in mission.blocks], clock.start, clock.dt, recorded)
         self._events: list[Events] = []
+        self._inputs: list[tuple[int, ExternalInput]] = []
+        self._input_stream: Stream | None = None
         self._rows_source: np.ndarray | None = None
         self._rows: RowSelection
         self._common_step = -1
@@ -149,6 +156,9 @@ class Recorder:
                 raise RecordError(
                     f"{self.directory}: holds a run already ({held[0]}); choose another directory, or remove it"
                 )
+            seeds = self.sim.state.context.seeds
+            if mission_text and len(seeds) == 1:
+                mission_text = with_seed(mission_text, int(seeds[0]))
             mission_text = mission_text or self._written_back()
             if mission_text:
                 (self.directory / MISSION_FILE).write_text(mission_text, encoding="utf-8")
@@ -205,6 +215,7 @@ class Recorder:
         sim.observers.append(self._observe)
         sim.events.listen(self._on_events)
         sim.events.traffic.append(self._traffic)
+        sim.events.inputs.append(self._on_input)
 
     # -- during the game ------------------------------------------------------------------------------------------------------
 
@@ -230,9 +241,9 @@ class Recorder:
                 if bodies.ints is not self._rows_source:
                     self._rows_source, self._rows = bodies.ints, RowSelection(bodies.ints)
                 self._add(self._rows, step)
-        n_letters = self._shapes.n_letters if self._shapes else 0
+        n_characters = self._shapes.n_characters if self._shapes else 0
         n_results = self._results.n if self._results else 0
-        if time.monotonic() >= self._flush_at or n_letters > MOST_LETTERS or n_results > MOST_RESULTS:
+        if time.monotonic() >= self._flush_at or n_characters > MAX_CHARACTERS or n_results > MAX_RESULTS:
             self.flush()
 
     def _observe_apart(self, sim: Recorded) -> None:
@@ -273,6 +284,18 @@ class Recorder:
                 parked = self.sim.state.parked[int(world)]
                 self._add(RowSelection(parked.bodies.ints), int(step), parked)
 
+    def _on_input(self, world: int, given: ExternalInput) -> None:
+        """Keep what came from outside."""
+        self._inputs.append((world, given))
+
+    def _write_inputs(self) -> None:
+        if self._input_stream is None:
+            self._input_stream = Stream(self.directory / INPUTS_FILE, INPUTS)
+            self._streams.append(self._input_stream)
+        clock = self.sim.state.context.clock
+        inputs, self._inputs = self._inputs, []
+        self._write(self._input_stream, batch_of(inputs, lambda step: clock.start + step * clock.dt))
+
     def _write(self, stream: Stream, batch: pa.RecordBatch) -> None:
         try:
             stream.write(batch)
@@ -293,6 +316,8 @@ class Recorder:
             self._write(self._shape_stream, drawn)
         if self._results and (changes := self._results.take()):
             self._write(self._result_stream, changes)
+        if self._inputs:
+            self._write_inputs()
         self._flush_at = time.monotonic() + self.flush_every
 
     def _take_events(self) -> pa.RecordBatch:
@@ -361,6 +386,8 @@ class Recorder:
         if self._observe in self.sim.observers:
             self.sim.observers.remove(self._observe)
         self.sim.events.forget(self._on_events)
+        if self._on_input in self.sim.events.inputs:
+            self.sim.events.inputs.remove(self._on_input)
         if self._traffic in self.sim.events.traffic:
             self.sim.events.traffic.remove(self._traffic)
         self._traffic.close()

@@ -13,7 +13,7 @@ import pyarrow as pa
 import pyarrow.csv
 
 from tussle.declare.displays import MAX_LINE, counted, line, listing, page, shortened, table
-from tussle.documents import DAMAGED, MOST_BYTES, read_text
+from tussle.documents import DAMAGED, MAX_BYTES, read_text
 from tussle.errors import MissingExtraError, ParameterError, RecordError, listed, nearest_name
 from tussle.mission.limits import Limits
 from tussle.record.arrow_file import read_batches
@@ -24,6 +24,9 @@ from tussle.record.schema import (
     EVENTS_FILE,
     EVENTS_RULES,
     FILES,
+    INPUTS,
+    INPUTS_FILE,
+    INPUTS_RULES,
     LINKS,
     LINKS_FILE,
     LINKS_RULES,
@@ -79,6 +82,7 @@ class Run:
         self.events_table = self._read_table(EVENTS_FILE, EVENTS, EVENTS_RULES, False)
         self.shapes_table = self._read_if_written(SHAPES_FILE, SHAPES, SHAPES_RULES, is_mapped)
         self.results_table = self._read_if_written(RESULTS_FILE, RESULTS, RESULTS_RULES, False)
+        self.inputs_table = self._read_if_written(INPUTS_FILE, INPUTS, INPUTS_RULES, False)
         self.links_table = self._read_if_written(LINKS_FILE, LINKS, LINKS_RULES, False)
 
     def _read_if_written(self, name: str, schema: pa.Schema, rules: Rules, is_mapped: bool) -> pa.Table:
@@ -152,6 +156,11 @@ class Run:
         return self._frame(self.results_table)
 
     @cached_property
+    def inputs(self) -> Any:
+        """Messages and columns that came from outside, as a frame."""
+        return self._frame(self.inputs_table)
+
+    @cached_property
     def links(self) -> Any:
         """Messages by network, sender, receiver and outcome, as a frame; written when the recorder is closed."""
         return self._frame(self.links_table)
@@ -181,7 +190,7 @@ class Run:
         path = self.path / MISSION_FILE
         return self._text(path, Limits.large().text) if path.exists() else None
 
-    def _text(self, path: Path, most: int = MOST_BYTES) -> str:
+    def _text(self, path: Path, most: int = MAX_BYTES) -> str:
         """The text of a file.
 
         Raises:

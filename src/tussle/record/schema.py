@@ -16,6 +16,7 @@ EVENTS_FILE = "events.arrow"
 SHAPES_FILE = "shapes.arrow"
 RESULTS_FILE = "results.arrow"
 LINKS_FILE = "links.arrow"
+INPUTS_FILE = "inputs.arrow"
 SUMMARY_FILE = "summary.csv"
 MISSION_FILE = "mission.xml"
 RUN_FILE = "run.json"
@@ -25,6 +26,7 @@ FILES = (
     SHAPES_FILE,
     RESULTS_FILE,
     LINKS_FILE,
+    INPUTS_FILE,
     SUMMARY_FILE,
     MISSION_FILE,
     RUN_FILE,
@@ -118,6 +120,26 @@ LINKS = pa.schema(
 )
 """One row per link and outcome that occurred, ordered by world, network, sender, receiver and outcome."""
 
+INPUTS = pa.schema(
+    [
+        _field("world", _I, "number of the world in its stack"),
+        _field("t", _F, "time at the beginning of the step [s]"),
+        _field("step", _I, "number of the step before which it came"),
+        _field("kind", pa.string(), "message or column"),
+        _field("name", pa.string(), "type of the message, or path of the column"),
+        _field("network", pa.string(), "network of the message; empty is the one that reaches everyone"),
+        _field("topic", pa.string(), "topic of the message; empty is the name of its type"),
+        pa.field(
+            "values",
+            pa.string(),
+            metadata={
+                "doc": "fields or values as JSON; null where a message held an object that JSON cannot hold"
+            },
+        ),
+    ]
+)
+"""One row per message or column that came from outside, in the order in which they came."""
+
 TRAJECTORY_RULES: Rules = (
     {"world": COUNT, "t": NUMBER, "step": COUNT, "id": COUNT, "block": TEXT}
     | dict.fromkeys(("x", "y", "z", "qw", "qx", "qy", "qz"), NUMBER)
@@ -127,7 +149,9 @@ SHAPES_RULES: Rules = {
     "world": COUNT, "t": NUMBER, "step": COUNT, "kind": TEXT, "lifetime": Bounds(0.0), "attributes": TEXT,
 }  # fmt: skip
 RESULTS_RULES: Rules = {"world": COUNT, "t": NUMBER, "step": COUNT, "name": TEXT}
-
+INPUTS_RULES: Rules = {
+    "world": COUNT, "t": NUMBER, "step": COUNT, "kind": TEXT, "name": TEXT, "network": TEXT, "topic": TEXT,
+}  # fmt: skip
 LINKS_RULES: Rules = {
     "world": COUNT, "network": TEXT, "sender": COUNT, "receiver": COUNT, "outcome": TEXT, "messages": COUNT,
 }  # fmt: skip

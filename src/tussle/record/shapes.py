@@ -20,13 +20,13 @@ class ShapeRows:
         sim: The simulation, see `recorder.Recorded`.
 
     Attributes:
-        n_letters: Length of the rows that are collected, in characters.
+        n_characters: Length of the rows that are collected, in characters.
     """
 
     def __init__(self, sim: Any) -> None:
         self._sim, self._context = sim, sim.state.context
         self._rows: list[tuple[Any, ...]] = []
-        self.n_letters = 0
+        self.n_characters = 0
         self._context.draw.sinks.append(self._add)
 
     def _add(self, kind: str, attributes: dict[str, Any]) -> None:
@@ -38,13 +38,13 @@ class ShapeRows:
             if kept is not None:
                 step = int(clock.step[world])
                 text = json.dumps(kept, default=_plain)
-                self.n_letters += len(text)
+                self.n_characters += len(text)
                 t = clock.start + step * clock.dt
                 self._rows.append((int(world), t, step, kind, lifetime_of(attributes), text))
 
     def take(self) -> pa.RecordBatch | None:
         """Return the rows so far, and forget them; None where there are none."""
-        rows, self._rows, self.n_letters = self._rows, [], 0
+        rows, self._rows, self.n_characters = self._rows, [], 0
         if not rows:
             return None
         arrays = [pa.array(column, f.type) for column, f in zip(zip(*rows, strict=True), SHAPES, strict=True)]

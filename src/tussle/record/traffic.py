@@ -13,7 +13,7 @@ import pyarrow as pa
 from tussle.errors import ParameterError, RecordError, listed, nearest_name
 from tussle.record.schema import FILES, LINKS
 
-MOST_LINKS = 1_000_000
+MAX_LINKS = 1_000_000
 """Links that are collected before equal ones are added up."""
 
 
@@ -88,7 +88,7 @@ class Traffic:
         rows[0], rows[1], rows[2], rows[3], rows[4], rows[5] = world, number, sender, receiver, outcome, 1
         self._links.append(rows)
         self._n_links += m
-        if self._n_links > MOST_LINKS:
+        if self._n_links > MAX_LINKS:
             self._links = [self._summed()]
             self._n_links = 0
 

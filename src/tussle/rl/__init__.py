@@ -10,11 +10,13 @@ except ImportError:
 
 from tussle.rl.action import Act
 from tussle.rl.computed import Computed
+from tussle.rl.dispersal import Dispersal
 from tussle.rl.draws import choice, uniform
 from tussle.rl.environments import TaskEnv, TaskVectorEnv, make, make_vec, register
 from tussle.rl.games import Consensus, NearOrigin, PredatorPrey, PredatorsAndPrey, PredatorTeam, PreyEscape
 from tussle.rl.observation import Component, Each, Means, NearestOthers, Own, Sectors
 from tussle.rl.parallel import TaskParallelEnv, parallel_env
+from tussle.rl.particles import SimpleAdversary, SimpleSpread, SimpleTag
 from tussle.rl.policy_file import write_policy
 from tussle.rl.reward import FoundOthers, Situation, Term, alive, captured, captures, collisions, died
 from tussle.rl.robots import Coverage, FindWay, Formation, Hover, ReachPoint
@@ -32,6 +34,7 @@ __all__ = [
     "Computed",
     "Consensus",
     "Coverage",
+    "Dispersal",
     "Each",
     "FindWay",
     "Formation",
@@ -48,6 +51,9 @@ __all__ = [
     "PreyEscape",
     "ReachPoint",
     "Sectors",
+    "SimpleAdversary",
+    "SimpleSpread",
+    "SimpleTag",
     "Situation",
     "Swarm",
     "Task",
@@ -83,6 +89,7 @@ for _task in (
     CaptureTheFlag,
     CaptureTheFlagRed,
     Coverage,
+    Dispersal,
     FindWay,
     Formation,
     Hover,
@@ -92,6 +99,9 @@ for _task in (
     PredatorsAndPrey,
     PreyEscape,
     ReachPoint,
+    SimpleAdversary,
+    SimpleSpread,
+    SimpleTag,
 ):
     register(f"tussle/{_task.__name__}-v0", _task)
 register("tussle/RLSimple-v0", NearOrigin)

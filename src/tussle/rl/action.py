@@ -170,6 +170,8 @@ class Decoder:
         else:
             self.space = spaces.Discrete(sizes[0]) if len(sizes) == 1 else spaces.MultiDiscrete(sizes)
         self.sizes = np.array(sizes)
+        self._sets_params = any("." in name for act in (*self.free, *self.constants) for name in act.names)
+        self._tables = [np.ascontiguousarray(act.table.T) for act in self.free if act.levels is not None]
 
     def write(self, part: AgentRows, actions: np.ndarray) -> int:
         """Set the columns of a part's agents from actions, (agents, numbers). Returns the first agent with a wrong action, or -1."""
@@ -184,7 +186,7 @@ class Decoder:
         wrong = self.decode(actions, part.agents, at, lambda target: group.table.array(places[target]))
         if wrong >= 0:
             return wrong
-        if any("." in name for act in (*self.free, *self.constants) for name in act.names):
+        if self._sets_params:
             for view in group.views:  # they keep what follows from parameters
                 view.kept.clear()
         return -1
@@ -206,15 +208,12 @@ class Decoder:
                 if wrong >= 0:
                     return int(wrong)
             return -1
-        chosen = actions[agents][:, : len(self.free)]
-        is_wrong = ((chosen < 0) | (chosen >= self.sizes)).any(axis=1)
-        if is_wrong.any():
-            return int(agents[np.flatnonzero(is_wrong)[0]])
-        for c, act in enumerate(self.free):
-            values = act.table[chosen[:, c]]
-            for k, name in enumerate(act.names):
-                column(name)[at] = values[:, k]
-        return -1
+        wrong = int(kernels.wrong_level(actions, agents, self.sizes))
+        if wrong < 0:
+            for c, (act, table) in enumerate(zip(self.free, self._tables, strict=True)):
+                for name, values in zip(act.names, table, strict=True):
+                    kernels.choose_level(actions, (at, agents), c, values, column(name))
+        return wrong
 
     @staticmethod
     def _place(group: Any, target: str) -> Any:

@@ -32,13 +32,34 @@ class Computed(Component):
     high: float | Sequence[float] = np.inf
 
     def width(self, mission: Mission, block: str) -> int:
+        self.check()
+        return self.n
+
+    def check(self) -> None:
+        """Check the bounds.
+
+        Raises:
+            ParameterError: They do not fit.
+        """
         if np.shape(self.low) not in ((), (self.n,)) or np.shape(self.high) not in ((), (self.n,)):
             raise ParameterError(f"Computed: low and high are one number, or {self.n} numbers")
         if not ((np.array(self.low) <= 0.0) & (np.array(self.high) >= 0.0)).all():
             raise ParameterError(
                 f"Computed: low = {self.low!r} and high = {self.high!r} are not allowed; 0 is between them"
             )
-        return self.n
+
+    def of_worlds(self, simulation: Simulation) -> np.ndarray:
+        """The function as one of worlds, (W, n).
+
+        Raises:
+            ParameterError: It returns another shape, or a number that is not finite.
+        """
+        values, shape = np.asarray(self.function(simulation)), (simulation.n_worlds, self.n)
+        if values.shape != shape or not np.isfinite(values).all():
+            raise ParameterError(
+                f"state: the function returns shape {values.shape}; it returns {shape}, {self.n} finite numbers for each world"
+            )
+        return values
 
     def bounds(self, mission: Mission, block: str) -> np.ndarray:
         return np.array([np.broadcast_to(self.low, self.n), np.broadcast_to(self.high, self.n)], float)

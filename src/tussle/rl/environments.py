@@ -27,19 +27,37 @@ OPTIONS = ("params",)
 VECTOR_OPTIONS = ("params", "reset_mask")
 
 
-def world_spaces(task: Task) -> tuple[spaces.Box, spaces.Space[Any]]:
-    """Observations and actions of all agents of a world; without the axis of agents if there is one agent."""
+def world_spaces(task: Task) -> tuple[spaces.Space[Any], spaces.Space[Any]]:
+    """Observations and actions of all agents of a world; without the axis of agents if there is one agent.
+
+    Raises:
+        ParameterError: Blocks have parts of the observation with different names.
+    """
     n = len(task.agent_names)
-    agents = range(n)
-    observation = max((task.observation_space(a) for a in agents), key=lambda space: space.shape[0])
-    action = max((task.action_space(a) for a in agents), key=spaces.flatdim)
-    if n == 1:
-        return observation, action
-    low, high = np.zeros((2, n, *observation.shape), task.dtype)
-    for a in agents:
-        space = task.observation_space(a)
-        low[a, : space.shape[0]], high[a, : space.shape[0]] = space.low, space.high
-    return spaces.Box(low, high, dtype=task.dtype), batch_space(action, n)
+    action = max((task.action_space(a) for a in range(n)), key=spaces.flatdim)
+    parts = list(task.parts.values())
+    if any(each != parts[0] for each in parts):
+        raise ParameterError(
+            f"{type(task).__name__}: blocks observe different parts; use the interface of PettingZoo"
+        )
+    low, high = task.limits if n > 1 else task.limits[:, 0]
+    flat = spaces.Box(low, high, dtype=task.dtype)
+    if n > 1:
+        action = batch_space(action, n)
+    if not parts[0]:
+        return flat, action
+    return spaces.Dict(
+        {
+            name: spaces.Box(flat.low[..., at], flat.high[..., at], dtype=task.dtype)
+            for name, at in parts[0].items()
+        }
+    ), action
+
+
+def in_parts(task: Task, seen: np.ndarray, block: int = 0) -> Any:
+    """Observations of a block, (..., n), as a dict if its parts have names."""
+    parts = task.parts[task.blocks[block].name]
+    return {name: seen[..., at] for name, at in parts.items()} if parts else seen
 
 
 def check_options(options: Any, known: tuple[str, ...] = OPTIONS) -> dict[str, Any]:
@@ -97,6 +115,14 @@ def _of_worlds(
     if not info["params"]:
         del info["params"]
     return {**info, **{f"_{name}": worlds.copy() for name in info}}
+
+
+def _terms_of_worlds(swarm: Swarm, worlds: np.ndarray) -> dict[str, Any]:
+    """Sums of each term over the agents of some worlds, (W,), as an info of their own, since a term may have any name."""
+    terms: dict[str, Any] = {}
+    for name, term in swarm.terms.items():
+        terms |= {name: np.where(worlds, term.sum(axis=1), 0), f"_{name}": worlds.copy()}
+    return {"terms": terms, "_terms": worlds.copy()}
 
 
 class Pictures:
@@ -173,21 +199,23 @@ class TaskVectorEnv(VectorEnv[Any, Any, Any]):
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         self._pictures = Pictures(self.swarm, render_mode)
 
-    def _seen(self, array: np.ndarray) -> np.ndarray:
+    def _seen(self, array: np.ndarray) -> Any:
         shown = array[:, 0] if self.swarm.n_agents == 1 else array
-        return shown.copy() if self.copy else shown
+        return in_parts(self.task, shown.copy() if self.copy else shown)
 
     def _info(self) -> dict[str, Any]:
         swarm, every = self.swarm, np.ones(self.num_envs, bool)
-        return _of_worlds(swarm.alive, swarm.seeds, swarm.params, every)
+        info = _of_worlds(swarm.alive, swarm.seeds, swarm.params, every)
+        if swarm.masks is not None:
+            mask = swarm.masks.astype(np.int8)
+            info |= {"action_mask": mask[:, 0] if swarm.n_agents == 1 else mask, "_action_mask": every}
+        return info
 
     def _final_info(self, over: np.ndarray) -> dict[str, Any]:
         """Infos at the end of the episodes that are over, as Gymnasium's own vector environments give them."""
         swarm = self.swarm
         info = _of_worlds(swarm.final_alive, swarm.final_seeds, swarm.final_params, over)
-        for name, term in swarm.terms.items():
-            info[name], info[f"_{name}"] = np.where(over, term.sum(axis=1), 0), over.copy()
-        return info
+        return {**info, **_terms_of_worlds(swarm, over)}
 
     def reset(self, *, seed: Any = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
         """Start new episodes.
@@ -229,9 +257,7 @@ class TaskVectorEnv(VectorEnv[Any, Any, Any]):
                 )
             given = given.reshape(self.num_envs, 1, -1)
         obs, rewards, _, _, _ = swarm.step(given)
-        info = self._info()
-        for name, term in swarm.terms.items():
-            info[name], info[f"_{name}"] = term.sum(axis=1), np.ones(self.num_envs, bool)
+        info = {**self._info(), **_terms_of_worlds(swarm, np.ones(self.num_envs, bool))}
         over = swarm.over.copy()
         if over.any() and swarm.autoreset == "same_step":
             info["final_obs"], info["_final_obs"] = self._seen(swarm.final_obs), over
@@ -263,8 +289,8 @@ class TaskEnv(gymnasium.Env[Any, Any]):
         self.observation_space, self.action_space = world_spaces(self.task)
         self._pictures = Pictures(self.swarm, render_mode)
 
-    def _seen(self, array: np.ndarray) -> np.ndarray:
-        return np.array(array[0, 0]) if self.swarm.n_agents == 1 else np.array(array[0])
+    def _seen(self, array: np.ndarray) -> Any:
+        return in_parts(self.task, np.array(array[0, 0] if self.swarm.n_agents == 1 else array[0]))
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -276,11 +302,12 @@ class TaskEnv(gymnasium.Env[Any, Any]):
         return self._seen(self.swarm.obs), self._info()
 
     def _info(self) -> dict[str, Any]:
-        return {
-            "alive": self.swarm.alive[0].copy(),
-            "seed": int(self.swarm.seeds[0]),
-            **told_of_one(self.swarm),
-        }
+        swarm, info = self.swarm, {}
+        if swarm.masks is not None:
+            info["action_mask"] = (swarm.masks[0, 0] if swarm.n_agents == 1 else swarm.masks[0]).astype(
+                np.int8
+            )
+        return {"alive": swarm.alive[0].copy(), "seed": int(swarm.seeds[0]), **info, **told_of_one(swarm)}
 
     def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         """Play one decision; the reward is the sum over agents."""
@@ -291,7 +318,7 @@ class TaskEnv(gymnasium.Env[Any, Any]):
             )
         swarm = self.swarm
         obs, rewards, _, _, _ = swarm.step(given.reshape(1, swarm.n_agents, -1))
-        info = {**self._info(), **{name: float(term.sum()) for name, term in swarm.terms.items()}}
+        info = {**self._info(), "terms": {name: float(term.sum()) for name, term in swarm.terms.items()}}
         over, late = bool(swarm.over[0]), bool(swarm.late[0])
         self._pictures.follow()
         return self._seen(obs), float(rewards.sum(dtype=float)), over and not late, over and late, info

@@ -72,6 +72,10 @@ class Episodes:
             Worlds, and their values by path, in SI units: those of variables and distributions, of which each world has its own.
         """
         varied = {variable.name: variable for variable in self.task.variables}
+        if not varied and not self.given:
+            for w in worlds[[bool(self.values[w]) for w in worlds.tolist()]].tolist():
+                self.values[w] = {}
+            return []
         found: dict[str, list[tuple[int, Any]]] = {}
         for w in worlds.tolist():
             mine = {**varied, **self.given.get(w, {})}

@@ -23,12 +23,12 @@ from tussle.rl.task import Task
 
 BATCH = 64
 """Rows per inference. Runtimes may sum in another order in a batch of another size, so the last one is filled up."""
-MOST_BYTES = 256 * 2**20
+MAX_BYTES = 256 * 2**20
 """Largest policy: a perceptron with layers of 4096 has 64 MiB."""
 
-MOST_MEMORY = 4 * 2**30
+MAX_MEMORY = 4 * 2**30
 """Memory of the weights and layers of all policies in a process: a few nodes could otherwise ask for any amount."""
-MOST_POLICIES = 64
+MAX_POLICIES = 64
 """Policies of a folder."""
 
 
@@ -84,9 +84,9 @@ class Policy:
         path = Path(self.path)
         if not path.is_file():
             raise self._refused("there is no such file; it takes an ONNX file")
-        if path.stat().st_size > MOST_BYTES:
-            raise self._refused(f"it has more than {MOST_BYTES // 2**20} MiB")
-        data = read_bytes(path, ParameterError, MOST_BYTES)
+        if path.stat().st_size > MAX_BYTES:
+            raise self._refused(f"it has more than {MAX_BYTES // 2**20} MiB")
+        data = read_bytes(path, ParameterError, MAX_BYTES)
         try:
             model = onnx.load_model_from_string(data)
         except Exception:  # noqa: BLE001 - a class of protobuf, which onnx does not export
@@ -99,11 +99,11 @@ class Policy:
                 location = next((e.value for e in tensor.external_data if e.key == "location"), "")
                 other = (folder / location).resolve()
                 if not (
-                    other.is_relative_to(folder) and other.is_file() and other.stat().st_size <= MOST_BYTES
+                    other.is_relative_to(folder) and other.is_file() and other.stat().st_size <= MAX_BYTES
                 ):
                     raise self._refused(
                         f"weights in {location!r} are not allowed; they are in the file itself, or in a file of at most "
-                        f"{MOST_BYTES // 2**20} MiB in its folder"
+                        f"{MAX_BYTES // 2**20} MiB in its folder"
                     )
         try:
             onnx.load_external_data_for_model(model, str(folder))
@@ -156,7 +156,7 @@ def has_limited_memory() -> bool:
     )
     try:
         onnxruntime.create_and_register_allocator(
-            memory, onnxruntime.OrtArenaCfg({"max_mem": MOST_MEMORY, "arena_extend_strategy": 1})
+            memory, onnxruntime.OrtArenaCfg({"max_mem": MAX_MEMORY, "arena_extend_strategy": 1})
         )
     except Exception:  # noqa: BLE001 - another library of this process has registered one
         return False
@@ -305,11 +305,11 @@ def load_flight(path: str, task: str, block: str) -> LearnedFlight:
     """
     files = [Path(path)]
     if files[0].is_dir():
-        files = sorted(files[0].glob("*.onnx"))[: MOST_POLICIES + 1]
-        if not 0 < len(files) <= MOST_POLICIES:
-            n = f"more than {MOST_POLICIES}" if files else "no"
+        files = sorted(files[0].glob("*.onnx"))[: MAX_POLICIES + 1]
+        if not 0 < len(files) <= MAX_POLICIES:
+            n = f"more than {MAX_POLICIES}" if files else "no"
             raise ParameterError(
-                f"Learned.policy = {path!r}: the folder has {n} ONNX files; it takes 1 to {MOST_POLICIES}"
+                f"Learned.policy = {path!r}: the folder has {n} ONNX files; it takes 1 to {MAX_POLICIES}"
             )
     stats = [(file, file.stat() if file.is_file() else None) for file in files]
     stamps = tuple(
@@ -329,7 +329,7 @@ def _flight(stamps: tuple[tuple[str, tuple[int, int]], ...], task: str, block: s
     return LearnedFlight(policies, registered_task(name, where), name, block)
 
 
-@lru_cache(maxsize=2 * MOST_POLICIES)
+@lru_cache(maxsize=2 * MAX_POLICIES)
 def _policy(path: str, stamp: tuple[int, int]) -> Policy:
     return Policy(path)
 

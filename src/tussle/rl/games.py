@@ -123,6 +123,7 @@ class PredatorsAndPrey(PredatorTeam):
         "keepers": PredatorTeam.action,
         "switchers": PredatorTeam.action,
     }
+    policies = {"prey": "prey", "keepers": "keepers", "switchers": "switchers"}  # noqa: RUF012
     reward = {"captures": Term(captures), "captured": Term(captured, -1.0)}  # noqa: RUF012 - declared as ClassVar in Task
 
 

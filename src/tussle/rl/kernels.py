@@ -160,6 +160,18 @@ def nearest(floats, who, wanted, blocks, index, spec, numbers, radius, part, out
             put_others(floats, team, row, others, k, spec, turn, a, column, width, out)
 
 
+def found(floats, who, team, near, spec, numbers, part, out):
+    """Write features of others that have been found: near, (m, k or more), rows of the body table, or -1.
+
+    numbers: k, frame, first column, columns per neighbour. part: agents [begin, end) of those in `who`.
+    """
+    rows, agents = who
+    k, frame, column, width = numbers
+    for i in range(part[0], part[1]):
+        turn = frame_of(floats, rows[i], frame)
+        put_others(floats, team, rows[i], near[i], k, spec, turn, agents[i], column, width, out)
+
+
 def nearest_apart(floats, who, wanted, places, arrays, spec, numbers, radius, team, out):
     """Like `nearest` for any k and any number of candidates, one agent after another.
 
@@ -220,6 +232,11 @@ def sums(floats, who, wanted, places, arrays, spec, numbers, radius, team, out):
     for i in range(rows.shape[0]):
         row, a = rows[i], agents[i]
         me, x, y, z = place[row], floats[0, row], floats[1, row], floats[2, row]
+        if width == 0:
+            out[a, column] = (
+                in_range(row_world[row], me, x, y, z, radius, mode, wanted[i], table, others[:0], 0) / unit
+            )
+            continue
         m = in_range(row_world[row], me, x, y, z, radius, mode, wanted[i], table, others, 0)
         for j in range(m):
             others[j] = order[others[j]]
@@ -261,6 +278,7 @@ BLOCKS = "(I2 I2 F2) (I I I I I F2 F)"
 SIGNATURES: dict[Any, str] = {
     own: f"F2 F2 i8 (I I) {SPEC} i8 i8",
     nearest: f"F2 (I i8 I) F {BLOCKS} {SPEC} (i8 i8 i8 i8 i8) f8 (i8 i8)",
+    found: f"F2 (I I) I I2 {SPEC} (i8 i8 i8 i8) (i8 i8)",
     nearest_apart: f"{SEARCH} {SPEC} (i8 i8 i8 i8 i8) f8 I",
     sectors: f"{SEARCH} (i8 i8 i8 i8) f8",
     sums: f"{SEARCH} {SPEC} (i8 i8 i8 i8 i8) f8 I",
@@ -282,3 +300,43 @@ def act(actions, who, first, column, low, high, channel):
             return place[i]
         channel[row[i] - first] = middle + half * min(max(value, -1.0), 1.0)
     return -1
+
+
+@kernel("I2 I I -> i8")
+def wrong_level(actions, place, sizes):
+    """Return the first agent of `place`, (m,), with an action that is no level, or -1. sizes: number of levels of each action."""
+    for i in range(place.shape[0]):
+        for c in range(sizes.shape[0]):
+            if not 0 <= actions[place[i], c] < sizes[c]:
+                return place[i]
+    return -1
+
+
+@kernel("I2 (I I) i8 F Fw")
+def choose_level(actions, who, column, values, channel):
+    """Write the value of each agent's level to a channel. who: rows of the channel, and agents, (m,) each."""
+    row, place = who
+    for i in range(row.shape[0]):
+        channel[row[i]] = values[min(actions[place[i], column], values.shape[0] - 1)]
+
+
+@kernel("F2 I I F2w")
+def take(table, row, place, out):
+    """Write columns of the body table, (k, N), to agents: out, (agents, k)."""
+    for i in range(row.shape[0]):
+        for c in range(table.shape[0]):
+            out[place[i], c] = table[c, row[i]]
+
+
+def settle(out, was_alive):
+    """Set a term of the reward of those that were dead to 0; all flat. Returns the first place that is not finite, or -1."""
+    for i in range(out.shape[0]):
+        if not was_alive[i]:
+            out[i] = 0.0
+        elif not math.isfinite(out[i]):
+            return i
+    return -1
+
+
+SETTLE = {"float32": kernel("Sw B -> i8")(settle), "float64": kernel("Fw B -> i8")(settle)}
+"""`settle` by type of the numbers."""

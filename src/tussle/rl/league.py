@@ -22,7 +22,7 @@ from tussle.rl.flight import Policy, load_flight, registered_task
 from tussle.rl.opponents import other_side, with_policy
 
 RULES = "rules"
-MOST_PLAYERS = 100
+MAX_PLAYERS = 100
 ELO = 400.0 / math.log(10.0)
 """Elo points of one unit of a log-odds: 400 points are odds of ten to one (Elo, The Rating of Chessplayers (1978), 8.4)."""
 
@@ -176,9 +176,9 @@ class League:
                     f"player {player.name!r} is there twice; each has a name of its own, such as late={player.path or RULES}"
                 )
             found[player.name] = player
-        if len(found) > MOST_PLAYERS:
+        if len(found) > MAX_PLAYERS:
             raise ParameterError(
-                f"{len(found)} players are not allowed; a league takes at most {MOST_PLAYERS}"
+                f"{len(found)} players are not allowed; a league takes at most {MAX_PLAYERS}"
             )
         return found
 

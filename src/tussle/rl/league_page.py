@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 PAGE = "league.html"
-MOST_CROSSED = 12
+MAX_CROSSED = 12
 """Players up to whom the page has a table of each against each."""
 
 
@@ -183,7 +183,7 @@ def pairings(standings: Standings, replays: dict[int, Path], directory: Path) ->
 def each_against_each(standings: Standings) -> Section:
     """The section with the points of each player against each."""
     names = [r.name for r in standings.ratings]
-    if not 2 < len(names) <= MOST_CROSSED:
+    if not 2 < len(names) <= MAX_CROSSED:
         return Section("each", "Each against each")
     points = {(p.a, p.b): p.share for p in standings.pairings} | {
         (p.b, p.a): 1.0 - p.share for p in standings.pairings

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import groupby
@@ -18,30 +17,34 @@ from tussle.numeric.neighbors.index import padded
 from tussle.numeric.neighbors.lane_count import LANES
 from tussle.numeric.neighbors.search import ANY, DIFFERENT, SAME
 from tussle.rl import kernels
+from tussle.rl.features import (
+    FRAMES,
+    LIMITS,
+    OTHERS,
+    OWN,
+    RELATIVE,
+    VECTORS,
+    Scale,
+    Spec,
+    bounds_of,
+    check_features,
+    factor_of,
+    of_others,
+    scalars,
+    span,
+    spans_of_others,
+    spec_of,
+)
+from tussle.rl.searches import SharedSearches
 
 if TYPE_CHECKING:
     from tussle.engine.group import Group
     from tussle.engine.simulation import Simulation
     from tussle.mission import Mission
 
-FRAMES = {"world": kernels.WORLD, "heading": kernels.HEADING, "body": kernels.BODY}
-VECTORS = ("pos", "vel", "omega", "force", "torque")
-OWN = ("forward", *FLOATS)
-OTHERS = {
-    "distance": kernels.DISTANCE,
-    "direction": kernels.DIRECTION,
-    "same_team": kernels.SAME_TEAM,
-    "present": kernels.PRESENT,
-}
 TEAMS = ("own", "other")
-LIMITS = {"forward": (-1.0, 1.0), "quat": (-1.0, 1.0), "radius": (0.0, np.inf), "mass": (0.0, np.inf)}
-"""Body columns whose ranges are known."""
-RELATIVE = {"offset": "pos", "relative_vel": "vel"}
 WHOLE_WORLD = 500
 """Up to this many entities, the nearest others are looked for among all of a world."""
-Scale = float | Mapping[str, float]
-Spec = tuple[np.ndarray, np.ndarray, np.ndarray]
-"""Features as kernels take them: kinds and rows of their source table, (n,), and their numbers, (n, 4)."""
 WRITERS = {
     np.dtype(dtype): {
         law.__name__: kernel(f"{signature} {out}")(law) for law, signature in kernels.SIGNATURES.items()
@@ -63,6 +66,7 @@ class AgentRows:
         team: Team of each as a float, (m,).
         kept: What components keep until rows change.
         span: All agents of the block in this group have rows from span[0] to span[1] - 1, though `rows` may be some of them.
+        searches: What searches share and keep; None where nothing is kept.
     """
 
     block: str
@@ -72,6 +76,7 @@ class AgentRows:
     team: np.ndarray
     kept: dict[Any, Any]
     span: tuple[int, int]
+    searches: SharedSearches | None = None
 
 
 class Component(ABC):
@@ -97,83 +102,6 @@ class Component(ABC):
         return np.repeat([[-np.inf], [np.inf]], self.width(mission, block), axis=1)
 
 
-ROUNDING = 1.0 + 1e-6
-"""Bounds are wider by this factor, since turned vectors of single precision may be longer by a rounding error."""
-
-
-def _span(low: float, high: float, factor: float, n: int) -> list[tuple[float, float]]:
-    """Bounds of n numbers that are multiplied by a factor."""
-    ends = low * factor * ROUNDING, high * factor * ROUNDING
-    return [(min(ends), max(ends))] * n
-
-
-def _spans_of_others(
-    names: Sequence[str], scale: Scale, planar: bool, reach: float
-) -> list[tuple[float, float]]:
-    """Bounds of the features of others within `reach` [m]."""
-    known = {
-        "offset": (-reach, reach), "distance": (0.0, reach), "direction": (-1.0, 1.0), "same_team": (0.0, 1.0),
-        "present": (0.0, 1.0), **LIMITS,
-    }  # fmt: skip
-    found = []
-    for name in names:
-        _, width = _of_others([name], scale, planar)
-        found += _span(*known.get(name, (-np.inf, np.inf)), _factor(scale, name), width)
-    return found
-
-
-def _bounds(spans: Sequence[tuple[float, float]]) -> np.ndarray:
-    return np.array(spans, float).reshape(-1, 2).T
-
-
-def _check(where: str, frame: str, names: Sequence[str], allowed: Sequence[str], scale: Scale) -> None:
-    if frame not in FRAMES:
-        raise ParameterError(f"{where}: frame = {frame!r} is not allowed; {listed(FRAMES)}")
-    for name in names:
-        if name not in allowed and not ("." in name and where == "Own"):
-            raise ParameterError(f"{where} has no {name!r}{nearest_name(name, allowed)}; {listed(allowed)}")
-    for name, value in scale.items() if isinstance(scale, Mapping) else [("", scale)]:
-        if name and name not in names:
-            raise ParameterError(f"{where}: scale of {name!r}{nearest_name(name, names)}; {listed(names)}")
-        if not abs(value) > 0.0:
-            raise ParameterError(f"{where}: scale = {value!r} is not allowed; it takes numbers other than 0")
-
-
-def _factor(scale: Scale, name: str) -> float:
-    return 1.0 / (scale.get(name, 1.0) if isinstance(scale, Mapping) else scale)
-
-
-def _spec(lines: Sequence[tuple[float, ...]]) -> Spec:
-    """Features as kernels take them, from a line (kind, source, scale, x, y, z) for each."""
-    numbers = np.array(lines, float).reshape(-1, 6)
-    return numbers[:, 0].astype(np.int64), numbers[:, 1].astype(np.int64), numbers[:, 2:].copy()
-
-
-def _scalars(first: int, n: int, factor: float) -> list[tuple[float, ...]]:
-    """Features that are n numbers of a table from row `first` on."""
-    return [(kernels.SCALAR, first + k, factor, 0.0, 0.0, 0.0) for k in range(n)]
-
-
-def _of_others(names: Sequence[str], scale: Scale, planar: bool) -> tuple[Spec, int]:
-    """The spec of features of others, and its number of columns."""
-    lines: list[tuple[float, ...]] = []
-    width = 0
-    for name in names:
-        source = RELATIVE.get(name, name)
-        factor = _factor(scale, name)
-        if name in OTHERS:
-            lines.append((OTHERS[name], 0, factor, 0, 0, 0))
-            width += 3 if name == "direction" else 1
-        elif source in VECTORS:
-            kind, k = (kernels.PLANE, 2) if planar else (kernels.SPACE, 3)
-            lines.append((kind, OFFSETS[source], factor, name in RELATIVE, 0, 0))
-            width += k
-        else:
-            lines += _scalars(OFFSETS[source], FLOATS[source], factor)
-            width += FLOATS[source]
-    return _spec(lines), width
-
-
 @dataclass(frozen=True)
 class Own(Component):
     """Columns of the agent itself.
@@ -194,7 +122,7 @@ class Own(Component):
 
     def width(self, mission: Mission, block: str) -> int:
         names = self.columns.split()
-        _check("Own", self.frame, names, OWN, self.scale)
+        check_features("Own", self.frame, names, OWN, self.scale)
         owner = next(b for b in mission.blocks if b.name == block)
         total = 0
         for name in names:
@@ -210,8 +138,8 @@ class Own(Component):
         spans: list[tuple[float, float]] = []
         for name in self.columns.split():
             width = _column_of(owner, name) if "." in name else self._lines(name)[1]
-            spans += _span(*LIMITS.get(name, (-np.inf, np.inf)), _factor(self.scale, name), width)
-        return _bounds(spans)
+            spans += span(*LIMITS.get(name, (-np.inf, np.inf)), factor_of(self.scale, name), width)
+        return bounds_of(spans)
 
     @cached_property
     def _parts(self) -> list[tuple[str, Spec, int]]:
@@ -219,26 +147,26 @@ class Own(Component):
         parts: list[tuple[str, Spec, int]] = []
         for is_plugin, names in groupby(self.columns.split(), lambda name: "." in name):
             if is_plugin:
-                parts += [(name, _spec([]), 0) for name in names]
+                parts += [(name, spec_of([]), 0) for name in names]
             else:
                 found: list[tuple[float, ...]] = []
                 width = 0
                 for name in names:
                     lines, k = self._lines(name)
                     found, width = found + lines, width + k
-                parts.append(("", _spec(found), width))
+                parts.append(("", spec_of(found), width))
         return parts
 
     def _lines(self, name: str) -> tuple[list[tuple[float, ...]], int]:
         """The features of a body column, and its number of columns."""
-        factor = _factor(self.scale, name)
+        factor = factor_of(self.scale, name)
         if name == "forward":
             return [(kernels.FORWARD, 0, factor, 0.0, 0.0, 0.0)], 3
         if name in VECTORS:
             kind, width = (kernels.PLANE, 2) if self.planar else (kernels.SPACE, 3)
             point = self.origin if name == "pos" else (0.0, 0.0, 0.0)
             return [(kind, OFFSETS[name], factor, *point)], width
-        return _scalars(OFFSETS[name], FLOATS[name], factor), FLOATS[name]
+        return scalars(OFFSETS[name], FLOATS[name], factor), FLOATS[name]
 
     def write(self, simulation: Simulation, part: AgentRows, column: int, out: np.ndarray) -> None:
         floats, own = simulation.state.population.bodies.floats, WRITERS[out.dtype]["own"]
@@ -255,7 +183,7 @@ class Own(Component):
     ) -> int:
         """Write a column of a plugin. Returns the next column."""
         table, shift, first, width = _plugin_column(part.group, name)
-        spec, who = _spec(_scalars(first, width, _factor(self.scale, name))), (part.rows, part.agents)
+        spec, who = spec_of(scalars(first, width, factor_of(self.scale, name))), (part.rows, part.agents)
         WRITERS[out.dtype]["own"](floats, table, shift, who, spec, FRAMES[self.frame], column, out)
         return column + width
 
@@ -291,7 +219,7 @@ def _plugin_column(group: Group, path: str) -> tuple[np.ndarray, int, int, int]:
     return table, group.first, place.first, max(1, place.k)
 
 
-def _block_numbers(mission: Mission, names: str) -> list[int]:
+def block_numbers(mission: Mission, names: str) -> list[int]:
     """Places in a mission of blocks whose names are separated by spaces."""
     return [i for i, b in enumerate(mission.blocks) if b.name in names.split()]
 
@@ -305,7 +233,7 @@ class _Others(Component):
 
     @cached_property
     def _features(self) -> tuple[Spec, int]:
-        return _of_others(self.columns.split(), self.scale, self.planar)
+        return of_others(self.columns.split(), self.scale, self.planar)
 
 
 def _split_of(simulation: Simulation) -> Any:
@@ -330,7 +258,7 @@ class _Search(_Others):
         if of is None:
             return ANY, part.team
         if isinstance(of, str) and of not in TEAMS:
-            numbers = _block_numbers(simulation.mission, of)
+            numbers = block_numbers(simulation.mission, of)
             return SAME, np.full(len(part.team), float(numbers[0]) if len(numbers) == 1 else 1.0)
         if isinstance(of, int):
             return SAME, np.full(len(part.team), float(of))
@@ -341,7 +269,7 @@ class _Search(_Others):
         bodies, of = simulation.state.population.bodies, self.of
         if not isinstance(of, str) or of in TEAMS:
             return bodies.by_place(index, "team", split)[0]
-        blocks, numbers = bodies.by_place(index, "block", split)[0], _block_numbers(simulation.mission, of)
+        blocks, numbers = bodies.by_place(index, "block", split)[0], block_numbers(simulation.mission, of)
         if len(numbers) == 1:
             return blocks
         found = padded(len(blocks))
@@ -368,10 +296,12 @@ class _Search(_Others):
             raise ParameterError(f"{name}: radius = {radius!r} is not allowed; it takes a number > 0")
 
     def _index(
-        self, simulation: Simulation, reach: float
+        self, simulation: Simulation, reach: float, is_whole: bool = False
     ) -> tuple[Any, tuple[np.ndarray, ...], tuple[np.ndarray, ...]]:
         bodies, split = simulation.state.population.bodies, _split_of(simulation)
-        index = bodies.any_index() if reach == np.inf else bodies.index(reach, split)
+        if is_whole:
+            reach = np.inf
+        index = bodies.any_index() if reach == np.inf and not is_whole else bodies.index(reach, split)
         places = index.row_world, index.place, index.order
         return bodies.floats, places, (*index.table, self._classes(simulation, index, split))
 
@@ -399,7 +329,7 @@ class NearestOthers(_Search):
 
     def width(self, mission: Mission, block: str) -> int:
         names = self.columns.split()
-        _check("NearestOthers", self.frame, names, (*RELATIVE, *OTHERS, *FLOATS), self.scale)
+        check_features("NearestOthers", self.frame, names, (*RELATIVE, *OTHERS, *FLOATS), self.scale)
         self._check_of(mission, self.radius, False)
         if self.k < 1:
             raise ParameterError(
@@ -408,7 +338,7 @@ class NearestOthers(_Search):
         return self.k * self._features[1]
 
     def bounds(self, mission: Mission, block: str) -> np.ndarray:
-        return _bounds(self.k * _spans_of_others(self.columns.split(), self.scale, self.planar, self.radius))
+        return bounds_of(self.k * spans_of_others(self.columns.split(), self.scale, self.planar, self.radius))
 
     def write(self, simulation: Simulation, part: AgentRows, column: int, out: np.ndarray) -> None:
         bodies = simulation.state.population.bodies
@@ -417,9 +347,32 @@ class NearestOthers(_Search):
         numbers = self.k, mode, FRAMES[self.frame], column, self._features[1]
         if self.k > LANES or (self.radius == np.inf and not is_small):
             self._write_apart(simulation, part, wanted, numbers, out)
+        elif is_small and part.searches is not None:
+            self._write_found(simulation, part, wanted, numbers, out)
         else:
             reach = np.inf if is_small else self.radius
             self._write_blocks(simulation, part, wanted, numbers, reach, out)
+
+    def _write_found(
+        self,
+        simulation: Simulation,
+        part: AgentRows,
+        wanted: np.ndarray,
+        numbers: tuple[int, ...],
+        out: np.ndarray,
+    ) -> None:
+        bodies, split = simulation.state.population.bodies, simulation.state.context.split
+        _, places, arrays = self._index(simulation, np.inf, is_whole=True)
+        who, search = (part.rows, part.agents), (self.k, numbers[1], self.radius)
+        assert part.searches is not None
+        near = part.searches.nearest(bodies, self.of, (*who, wanted), places, arrays, search, split)
+        write, spec = WRITERS[out.dtype]["found"], self._features[0]
+        split(
+            len(part.rows),
+            lambda *some: write(
+                bodies.floats, who, bodies.team, near, spec, (self.k, *numbers[2:]), some, out
+            ),
+        )
 
     def _write_apart(
         self,
@@ -482,14 +435,14 @@ class Sectors(_Search):
     frame: str = "heading"
 
     def width(self, mission: Mission, block: str) -> int:
-        _check("Sectors", self.frame, (), (), 1.0)
+        check_features("Sectors", self.frame, (), (), 1.0)
         self._check_of(mission, self.radius, True)
         if self.n < 1:
             raise ParameterError(f"Sectors: n = {self.n!r} is not allowed; it takes a whole number >= 1")
         return self.n
 
     def bounds(self, mission: Mission, block: str) -> np.ndarray:
-        return _bounds([(0.0, 1.0)] * self.n)
+        return bounds_of([(0.0, 1.0)] * self.n)
 
     def write(self, simulation: Simulation, part: AgentRows, column: int, out: np.ndarray) -> None:
         mode, wanted = self._wanted(part, simulation)
@@ -513,18 +466,21 @@ class Means(_Search):
 
     def width(self, mission: Mission, block: str) -> int:
         names = self.columns.split()
-        _check("Means", self.frame, names, (*RELATIVE, *OTHERS, *FLOATS), self.scale)
+        check_features("Means", self.frame, names, (*RELATIVE, *OTHERS, *FLOATS), self.scale)
         self._check_of(mission, self.radius, True)
         return 1 + self._features[1]
 
     def bounds(self, mission: Mission, block: str) -> np.ndarray:
         count = (0.0, np.inf) if self.count_scale > 0 else (-np.inf, 0.0)
-        return _bounds([count, *_spans_of_others(self.columns.split(), self.scale, self.planar, self.radius)])
+        return bounds_of(
+            [count, *spans_of_others(self.columns.split(), self.scale, self.planar, self.radius)]
+        )
 
     def write(self, simulation: Simulation, part: AgentRows, column: int, out: np.ndarray) -> None:
         spec, width = self._features
         mode, wanted = self._wanted(part, simulation)
-        floats, places, arrays = self._index(simulation, self.radius)
+        is_counted = width == 0 and simulation.state.population.bodies.n <= WHOLE_WORLD * simulation.n_worlds
+        floats, places, arrays = self._index(simulation, self.radius, is_counted)
         numbers = mode, FRAMES[self.frame], column, width, self.count_scale
         who, team = (part.rows, part.agents), simulation.state.population.bodies.team
         WRITERS[out.dtype]["sums"](floats, who, wanted, places, arrays, spec, numbers, self.radius, team, out)
@@ -548,7 +504,7 @@ class Each(_Others):
 
     def width(self, mission: Mission, block: str) -> int:
         names, blocks = self.columns.split(), {b.name: b.count for b in mission.blocks}
-        _check("Each", self.frame, names, (*RELATIVE, *OTHERS, *FLOATS), self.scale)
+        check_features("Each", self.frame, names, (*RELATIVE, *OTHERS, *FLOATS), self.scale)
         for name in self.of.split():
             if name not in blocks:
                 raise ParameterError(
@@ -558,8 +514,8 @@ class Each(_Others):
         return n_others * self._features[1]
 
     def bounds(self, mission: Mission, block: str) -> np.ndarray:
-        spans = _spans_of_others(self.columns.split(), self.scale, self.planar, np.inf)
-        return _bounds(self.width(mission, block) // max(len(spans), 1) * spans)
+        spans = spans_of_others(self.columns.split(), self.scale, self.planar, np.inf)
+        return bounds_of(self.width(mission, block) // max(len(spans), 1) * spans)
 
     def write(self, simulation: Simulation, part: AgentRows, column: int, out: np.ndarray) -> None:
         spec, width = self._features

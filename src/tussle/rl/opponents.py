@@ -12,7 +12,7 @@ from tussle.mission import Mission
 from tussle.numeric import rng
 from tussle.plugins.stock import Learned
 from tussle.rl.action import Actor, learned
-from tussle.rl.flight import MOST_POLICIES, registered_task, registered_tasks
+from tussle.rl.flight import MAX_POLICIES, registered_task, registered_tasks
 from tussle.rl.policy_file import write_policy
 from tussle.rl.swarm import task_of
 from tussle.rl.task import Task
@@ -88,10 +88,8 @@ class Pool:
         other = other_side(name, task)
         self._name, self._seed = name, seed
         slots = [slot for entry in entries for slot in _slots(entry)]
-        if not 0 < len(slots) <= MOST_POLICIES:
-            raise ParameterError(
-                f"a pool of {len(slots)} slots is not allowed; it takes 1 to {MOST_POLICIES}"
-            )
+        if not 0 < len(slots) <= MAX_POLICIES:
+            raise ParameterError(f"a pool of {len(slots)} slots is not allowed; it takes 1 to {MAX_POLICIES}")
         if not task.is_symmetric and {LATEST, FORMER} & {kind for kind, _ in slots}:
             raise ParameterError(
                 f"{name}: 'latest' and 'past' are policies of the learners, and the other side is another one, {task.opponents}; "

@@ -10,7 +10,7 @@ import numpy as np
 from pettingzoo import ParallelEnv
 
 from tussle.errors import ParameterError, nearest_name
-from tussle.rl.environments import Pictures, check_options, metadata_of, reset_one, told_of_one
+from tussle.rl.environments import Pictures, check_options, in_parts, metadata_of, reset_one, told_of_one
 from tussle.rl.swarm import Swarm
 
 DTYPE, SHAPE = attrgetter("dtype"), attrgetter("shape")
@@ -30,10 +30,16 @@ class TaskParallelEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]  # Pett
         self.possible_agents = list(self.task.agent_names)
         self.agents: list[str] = []
         self._at: Any = []  # their numbers
+        self._rows: Any = None  # of the body table, which change when agents die or are born
         self._number = {name: a for a, name in enumerate(self.possible_agents)}
         self.observation_spaces = {name: self.task.observation_space(a) for name, a in self._number.items()}
         self.action_spaces = {name: self.task.action_space(a) for name, a in self._number.items()}
-        self._width = {name: space.shape[0] for name, space in self.observation_spaces.items()}
+        self.state_space = self.task.state_space
+        block = dict(zip(self.possible_agents, self.task.agent_block.tolist(), strict=True))
+        self._block, widths = block, [sum(w) for w in self.task.widths.values()]
+        self._width = {name: widths[block[name]] for name in self.possible_agents}
+        self._n_levels = [sum(map(int, decoder.sizes)) for decoder in self.task.decoders]
+        self._has_parts = any(self.task.parts.values())
         self._is_same_width = len(set(self._width.values())) == 1
         swarm = self.swarm
         kind = self.task.dtype if swarm.is_continuous else np.int64
@@ -50,6 +56,9 @@ class TaskParallelEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]  # Pett
 
     def _observed(self, agents: list[str], numbers: Any) -> dict[str, np.ndarray]:
         obs = self.swarm.obs[0][numbers]
+        if self._has_parts:
+            rows = {name: row[: self._width[name]].copy() for name, row in zip(agents, obs, strict=True)}
+            return {name: in_parts(self.task, row, self._block[name]) for name, row in rows.items()}
         if self._is_same_width:
             return dict(zip(agents, obs.copy() if isinstance(numbers, slice) else obs, strict=True))
         return {name: row[: self._width[name]].copy() for name, row in zip(agents, obs, strict=True)}
@@ -64,7 +73,16 @@ class TaskParallelEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]  # Pett
         self._at = self._numbers(self.agents)
         self._pictures.follow()
         info = {"seed": int(self.swarm.seeds[0]), **told_of_one(self.swarm)}
-        return self._observed(self.agents, self._at), {name: dict(info) for name in self.agents}
+        infos = {name: dict(info) for name in self.agents}
+        self._add_masks(infos)
+        return self._observed(self.agents, self._at), infos
+
+    def _add_masks(self, infos: dict[str, dict[str, Any]]) -> None:
+        """Add the levels that agents may choose to their infos, if the task masks actions."""
+        if self.swarm.masks is not None:
+            masks = self.swarm.masks[0].astype(np.int8)
+            for name, info in infos.items():
+                info["action_mask"] = masks[self._number[name], : self._n_levels[self._block[name]]]
 
     def _living(self) -> list[str]:
         alive = self.swarm.alive[0]
@@ -89,9 +107,11 @@ class TaskParallelEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]  # Pett
         swarm.step(self._actions[None])
         self._pictures.follow()
         dead = swarm.terminations[0]
-        self.agents = [] if swarm.over[0] else self._living()
-        reported, numbers = before, self._at
-        if self.agents != before:
+        is_same = swarm.now.rows is self._rows and not swarm.over[0]
+        if not is_same:
+            self.agents = [] if swarm.over[0] else self._living()
+        reported, numbers, self._rows = before, self._at, swarm.now.rows
+        if not is_same and self.agents != before:
             known, is_dead = set(before), dead.tolist()
             reported = before + [name for name in self.agents if name not in known]
             self.agents = [name for name in self.agents if not is_dead[self._number[name]]]
@@ -108,6 +128,7 @@ class TaskParallelEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]  # Pett
                     "r": float(swarm.returns[0, self._number[name]]),
                     "l": int(swarm.lengths[0]),
                 }
+        self._add_masks(infos)
         return self._observed(reported, numbers), rewards, deaths, ends, infos
 
     def _by_name(self, agents: list[str], values: np.ndarray) -> dict[str, Any]:
@@ -121,7 +142,8 @@ class TaskParallelEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]  # Pett
 
     def _take(self, actions: Mapping[str, Any]) -> None:
         """Write the actions to one array."""
-        if list(actions) != self.agents and actions.keys() != set(self.agents):
+        is_in_order = list(actions) == self.agents
+        if not is_in_order and actions.keys() != set(self.agents):
             for name in actions:
                 if name not in self.agents:
                     known = name in self._number
@@ -133,7 +155,7 @@ class TaskParallelEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]  # Pett
                     raise ParameterError(f"there is an action for {name!r}, which {text}")
             missing = next(name for name in self.agents if name not in actions)
             raise ParameterError(f"the action of {missing!r} is missing")
-        many = [actions[name] for name in self.agents]
+        many = list(actions.values()) if is_in_order else [actions[name] for name in self.agents]
         if not (many and self._take_rows(many)):
             self._take_each(many)
 
@@ -169,8 +191,8 @@ class TaskParallelEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]  # Pett
         return self._pictures.picture()
 
     def state(self) -> np.ndarray:
-        """Observations of all agents side by side."""
-        return np.array(self.swarm.obs[0]).reshape(-1)
+        """What a centralised critic sees, in `state_space`: the task's `state`, or the observations of all agents side by side."""
+        return np.array(self.swarm.central_state[0])
 
     def close(self) -> None:
         self._pictures.close()

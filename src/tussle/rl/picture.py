@@ -11,20 +11,20 @@ from tussle.engine.simulation import Simulation
 from tussle.view.export.film.cameras import (
     AZIMUTH,
     ELEVATION,
-    LARGEST,
     MARGIN,
-    SMALLEST,
+    MAX_SIZE,
+    MIN_SIZE,
     UP,
     VIEW_ANGLE,
     View,
 )
 from tussle.view.export.film.renderer import Renderer
-from tussle.view.frame import Lens
+from tussle.view.frame import FrameReader
 from tussle.view.scenery import scenery_of
 from tussle.view.style import Style
 
 SIZE = (640, 480)
-LEAST_HALF = 1.0
+MIN_HALF = 1.0
 """Least half of the height that a picture shows [m]."""
 
 
@@ -46,20 +46,20 @@ class WorldCamera:
         plugins = [[type(p).__name__ for p in b.plugins] for b in blocks]
         boxes = [b.box for b in blocks]
         style = Style([b.name for b in blocks], [b.team for b in blocks], plugins, boxes=boxes)
-        self._lens, self._aspect = Lens(simulation, world), size[0] / size[1]
+        self._reader, self._aspect = FrameReader(simulation, world), size[0] / size[1]
         self._renderer = Renderer(style, scenery_of(simulation.mission), size)
         flat = math.cos(ELEVATION)
         self._back = np.array([flat * math.cos(AZIMUTH), flat * math.sin(AZIMUTH), math.sin(ELEVATION)])
 
     def picture(self) -> Any:
         """The present state as red, green, blue, (height, width, 3), uint8."""
-        frame = self._lens.frame()
+        frame = self._reader.frame()
         pos = frame.pos if len(frame) else np.zeros((1, 3))
         low, high = pos.min(axis=0), pos.max(axis=0)
-        half = max(0.5 * float(np.linalg.norm(high - low)) / MARGIN, LEAST_HALF)
+        half = max(0.5 * float(np.linalg.norm(high - low)) / MARGIN, MIN_HALF)
         middle, seen = 0.5 * (low + high), 2.0 * half * self._aspect
         spacing = seen / math.sqrt(len(pos) + 1.0)
-        length = float(np.clip(spacing, SMALLEST * seen, LARGEST * seen))
+        length = float(np.clip(spacing, MIN_SIZE * seen, MAX_SIZE * seen))
         eye = middle + self._back * half / math.tan(0.5 * VIEW_ANGLE)
         self._renderer.show(frame, View(eye, middle, UP, half, model_length=length))
         return self._renderer.picture()

@@ -11,7 +11,8 @@ import numpy as np
 from tussle.api.bodies import DERIVED, FLOATS
 from tussle.errors import ParameterError, listed, nearest_name
 from tussle.record.events import CAPTURE, COLLISION, DEATH, FLAG
-from tussle.rl.observation import AgentRows, Component, Means, NearestOthers
+from tussle.rl.kernels import SETTLE, take
+from tussle.rl.observation import TEAMS, AgentRows, Component, Means, NearestOthers, block_numbers
 
 if TYPE_CHECKING:
     from tussle.engine.simulation import Simulation
@@ -66,7 +67,8 @@ class Situation:
         self._begun = np.zeros(len(alive), bool)  # worlds whose events belong to an earlier episode
         self._parts: list[AgentRows] = []
         self._columns: dict[Any, Any] = {}  # of this state
-        self._checked: dict[Component, int] = {}
+        self._components: dict[Any, tuple[Component, int]] = {}  # and their widths
+        self._blocks: dict[Any, list[int]] = {}
 
     @property
     def t(self) -> np.ndarray:
@@ -84,8 +86,9 @@ class Situation:
         if name not in self._columns:
             bodies = self.simulation.state.population.bodies
             source = bodies.derived(name) if name in DERIVED else getattr(bodies, name)
-            out = np.zeros((self.alive.size, *source.shape[:-1]))
-            out[self.agents] = source[..., self.rows].T
+            table = np.atleast_2d(source)
+            out = np.zeros((self.alive.size, len(table)))
+            take(np.ascontiguousarray(table, float), self.rows, self.agents, out)
             self._columns[name] = out.reshape(*self.alive.shape, *source.shape[:-1])
         return self._columns[name]  # type: ignore[no-any-return]
 
@@ -104,10 +107,10 @@ class Situation:
         """
         key = "nearest", of, radius, k
         if key not in self._columns:
-            many = NearestOthers(
-                1 if k is None else k, "offset relative_vel distance present", of, radius, frame="world"
-            )
-            values = self._observed(many).reshape(*self.alive.shape, *([] if k is None else [k]), 8)
+            n = 1 if k is None else k
+            names = "offset relative_vel distance present"
+            seen = self._observed(key, lambda: NearestOthers(n, names, of, radius, frame="world"))
+            values = seen.reshape(*self.alive.shape, *([] if k is None else [k]), 8)
             found = values[..., 7] > 0.0
             distance = np.where(found, values[..., 6], np.inf)
             self._columns[key] = FoundOthers(found, distance, values[..., :3], values[..., 3:6])
@@ -121,15 +124,39 @@ class Situation:
         """
         key = "within", of, radius
         if key not in self._columns:
-            self._columns[key] = self._observed(Means(radius, "", of)).reshape(self.alive.shape)
+            self._columns[key] = self._observed(key, lambda: Means(radius, "", of)).reshape(self.alive.shape)
         return self._columns[key]  # type: ignore[no-any-return]
 
-    def _observed(self, component: Component) -> np.ndarray:
-        """What a component observes of the present state, (W A, numbers); 0 for the dead."""
-        if component not in self._checked:
-            mission = self.simulation.mission
-            self._checked[component] = max(component.width(mission, b.name) for b in mission.blocks)
-        out = np.zeros((self.alive.size, self._checked[component]))
+    def n_living(self, of: str | int) -> np.ndarray:
+        """Return the number of living entities of a team, or of blocks, whose names are separated by spaces, (W,).
+
+        Raises:
+            ParameterError: There is no such team or block.
+        """
+        bodies, mission = self.simulation.state.population.bodies, self.simulation.mission
+        if of not in self._blocks:
+            if of in (None, *TEAMS):
+                raise ParameterError(
+                    f"n_living: of = {of!r} is not allowed; it takes a team number or names of blocks"
+                )
+            Means(1.0, "", of).width(mission, mission.blocks[0].name)  # refuses unknown ones
+            self._blocks[of] = block_numbers(mission, of) if isinstance(of, str) else []
+        if "living" not in self._columns:
+            n = len(mission.blocks)
+            cells = np.bincount(bodies.world * n + bodies.block, minlength=len(self.alive) * n)
+            self._columns["living"] = cells.reshape(-1, n)
+        if isinstance(of, str):
+            return np.asarray(self._columns["living"][:, self._blocks[of]].sum(axis=1))
+        return np.bincount(bodies.world[bodies.team == of], minlength=len(self.alive))
+
+    def _observed(self, key: Any, make: Callable[[], Component]) -> np.ndarray:
+        """What a component, which is made once, observes of the present state, (W A, numbers); 0 for the dead."""
+        if key not in self._components:
+            component, mission = make(), self.simulation.mission
+            width = max(component.width(mission, b.name) for b in mission.blocks)
+            self._components[key] = component, width
+        component, width = self._components[key]
+        out = np.zeros((self.alive.size, width))
         for part in self._parts:
             component.write(self.simulation, part, 0, out)
         return out
@@ -211,11 +238,16 @@ def collisions(now: Situation) -> np.ndarray:
     return np.asarray(now.count("collision") + now.count("collision", "other"))
 
 
+def dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Scalar products of vectors, (..., 3) each; several times as fast as a sum over the last axis, with the same bits."""
+    return np.asarray(a[..., 0] * b[..., 0] + a[..., 1] * b[..., 1] + a[..., 2] * b[..., 2])
+
+
 def closing(now: Situation, blocks: str) -> np.ndarray:
     """Speed at which the distance to the nearest entity of some blocks decreases [m/s], (W, A); 0 without any, and for the dead."""
     near = now.nearest(blocks)
     towards = near.offset / np.maximum(near.distance, 1e-300)[..., None]
-    return -np.asarray((near.relative_vel * towards).sum(axis=-1))
+    return -dot(near.relative_vel, towards)
 
 
 @dataclass(frozen=True)
@@ -252,9 +284,9 @@ class Term:
                 "for each world, such as values[:, None]"
             )
         np.multiply(values, self.weight, out=out, casting="same_kind")
-        out[~now.was_alive] = 0.0
-        if not np.isfinite(out).all():
-            world, agent = np.argwhere(~np.isfinite(out))[0].tolist()
+        wrong = int(SETTLE[out.dtype.name](out.reshape(-1), now.was_alive.reshape(-1)))
+        if wrong >= 0:
+            world, agent = divmod(wrong, agents)
             raise ParameterError(
                 f"is {out[world, agent]} for agent {agent} in world {world}; it returns finite numbers "
                 "(`simulation.read` has NaN for the dead)"

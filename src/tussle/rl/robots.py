@@ -23,7 +23,7 @@ from tussle.plugins.stock import (
 )  # fmt: skip
 from tussle.rl.action import Act
 from tussle.rl.observation import NearestOthers, Own, Sectors
-from tussle.rl.reward import Situation, Term, died
+from tussle.rl.reward import Situation, Term, died, dot
 from tussle.rl.task import Task
 
 GOAL = (100.0, 0.0, 0.0)
@@ -76,7 +76,7 @@ def hovering(now: Situation) -> np.ndarray:
 def towards(now: Situation, goal: tuple[float, float, float]) -> np.ndarray:
     """Speed at which the distance to a point decreases [m/s], (W, A)."""
     offset = goal - now.pos
-    return np.asarray((offset * now.vel).sum(axis=-1) / np.maximum(np.linalg.norm(offset, axis=-1), 1e-9))
+    return np.asarray(dot(offset, now.vel) / np.maximum(np.sqrt(dot(offset, offset)), 1e-9))
 
 
 def approaching(now: Situation) -> np.ndarray:
@@ -151,9 +151,9 @@ class FindWay(Task):
 
 def headings(now: Situation) -> np.ndarray:
     """Share of the flock's common heading in each own heading, -1 to 1, (W, A)."""
-    unit = now.vel / np.maximum(np.linalg.norm(now.vel, axis=-1, keepdims=True), 1e-9)
+    unit = now.vel / np.maximum(np.sqrt(dot(now.vel, now.vel)), 1e-9)[..., None]
     mean = unit.sum(axis=1, keepdims=True) / np.maximum(now.alive.sum(axis=1), 1)[:, None, None]
-    return np.asarray((unit * mean).sum(axis=-1))
+    return dot(unit, mean)
 
 
 def spacing(now: Situation) -> np.ndarray:

@@ -16,6 +16,7 @@ from tussle.errors import ParameterError, SnapshotError, WiringError, listed
 from tussle.rl.episodes import Episodes, checked_params, checked_seeds, checked_value, checked_worlds
 from tussle.rl.observation import AgentRows, Each
 from tussle.rl.reward import COUNTED, NOBODY, Situation
+from tussle.rl.searches import SharedSearches
 from tussle.rl.task import Task
 
 AUTORESET = ("next_step", "same_step", "disabled")
@@ -52,6 +53,7 @@ class Swarm:
             `final_params` are the others at that time.
         alive: Living agents, (W, A).
         over: Worlds whose episode ended in the last step, (W,); `late` those by the time limit.
+        masks: Levels that each agent may choose, (W, A, n), if the task masks actions; all of the dead.
         terms: Terms of the last reward, weighted, by name, (W, A) each.
         returns: Sum of rewards of the present episode, (W, A); of the ended one in worlds that are `over`, until the next step.
         lengths: Decisions of that episode, (W,).
@@ -77,6 +79,12 @@ class Swarm:
         self.final_params: dict[str, Any] = {}
         self.rewards, self.returns = np.zeros(shape, dtype), np.zeros(shape)
         self.terms = {name: np.zeros(shape, dtype) for name in task.reward}
+        self.masks = (
+            np.ones((*shape, max(sum(map(int, d.sizes)) for d in task.decoders)), bool)
+            if task.has_mask
+            else None
+        )
+        self._states = np.zeros((2, worlds, task.state.n), dtype) if task.state is not None else None
         self.terminations, self.truncations, self.alive = np.zeros((3, *shape), bool)
         self.lengths, (self.over, self.late) = np.zeros(worlds, np.int64), np.zeros((2, worlds), bool)
         self.episodes = Episodes(task, worlds)
@@ -98,14 +106,18 @@ class Swarm:
         self.is_continuous = task.decoders[0].is_continuous
         if any(d.is_continuous != self.is_continuous for d in task.decoders):
             raise ParameterError(f"{type(task).__name__}: action: all blocks have ranges, or all have levels")
+        places = [np.flatnonzero(task.agent_block == i) for i in range(len(task.blocks))]
+        self._choosers = list(zip(task.decoders, places, strict=True))
         self.action_width = max(len(d.free) for d in task.decoders)
         self._ints: np.ndarray | None = None
+        self._searches = SharedSearches(self.n_worlds * self.n_agents)
         self._parts: list[AgentRows] = []
         self._watching: list[AgentRows] = []
         seen = [task.components(b.name) for b in task.blocks]
         self._is_alike = all(each == seen[0] for each in seen) and not any(
             isinstance(c, Each) for c in seen[0]
         )
+        self._columns, self._never_ends = task.columns, type(task).ends is Task.ends
         self._check_ends = True
         self._told: dict[str, Any] | None = None
 
@@ -149,6 +161,7 @@ class Swarm:
             self._begin(np.arange(self.n_worlds) if self.is_fresh else chosen)
             self.over[chosen] = False
             self._observe(None if self.is_fresh else chosen)
+            self._look_ahead()
         self.is_fresh = False
         return self.obs
 
@@ -212,7 +225,7 @@ class Swarm:
                 agents = bodies.world[rows] * self.n_agents + (first + place)
                 alive[agents], ids[agents] = True, bodies.id[rows]
                 team, span = bodies.team[rows].astype(float), (int(rows[0]), int(rows[-1]) + 1)
-                self._parts.append(AgentRows(name, group, rows, agents, team, kept, span))
+                self._parts.append(AgentRows(name, group, rows, agents, team, kept, span, self._searches))
         joined = self._joined(self._parts)
         self._watching = joined if self._is_alike else self._parts
         self.now.look(joined)
@@ -250,13 +263,9 @@ class Swarm:
                 mask[worlds] = True
                 kept = mask[part.agents // self.n_agents]
                 some = replace(part, rows=part.rows[kept], agents=part.agents[kept], team=part.team[kept])
-            column = 0
             if len(some.rows):
-                for component, width in zip(
-                    self.task.components(part.block), self.task.widths[part.block], strict=True
-                ):
+                for component, column in self._columns[part.block]:
                     component.write(self.simulation, some, column, out)
-                    column += width
 
     # -- steps -------------------------------------------------------------------------------------------------------------
 
@@ -294,14 +303,59 @@ class Swarm:
             self.final_obs[ended] = self.obs[ended]
             self.final_alive[ended], self.final_seeds[ended] = self.alive[ended], self.seeds[ended]
             self.final_params = self.params
+            if self._states is not None:
+                self._states[1] = self._of_worlds()
             returns, lengths = self.returns[ended], self.lengths[ended]
             self._restart(ended)
             self._observe(ended)
             self.returns[ended], self.lengths[ended] = returns, lengths
+        self._look_ahead()
         info = {"alive": self.alive, "over": self.over, "terms": self.terms}
+        if self.masks is not None:
+            info["action_mask"] = self.masks
         if self.autoreset == "same_step":
             info["final_obs"] = self.final_obs
         return self.obs, self.rewards, self.terminations, self.truncations, info
+
+    def _of_worlds(self) -> np.ndarray:
+        assert self.task.state is not None
+        return self.task.state.of_worlds(self.simulation)
+
+    def _look_ahead(self) -> None:
+        """Compute what belongs to the next decision besides observations: the state of each world, and masks."""
+        if self._states is not None:
+            self._states[0] = self._of_worlds()
+        if self.masks is None:
+            return
+        given = np.asarray(self.task.action_mask(self.now))
+        where, shape = f"{type(self.task).__name__}.action_mask", self.masks.shape
+        try:
+            self.masks[:] = np.broadcast_to(given, shape)
+        except ValueError:
+            given = given.astype(float)
+        if given.dtype != bool:
+            raise ParameterError(
+                f"{where} returns {given.dtype} of shape {given.shape}; it returns truth values, {shape}"
+            )
+        self.masks[~self.alive] = True
+        for decoder, agents in self._choosers:
+            for first, n in zip(np.cumsum([0, *decoder.sizes]), decoder.sizes, strict=False):
+                is_free = self.masks[:, agents, first : first + n].any(axis=-1)
+                if not is_free.all():
+                    world, agent = np.argwhere(~is_free)[0]
+                    raise ParameterError(
+                        f"{where} leaves {self.task.agent_names[agents[agent]]} in world {world} no level"
+                    )
+
+    @property
+    def central_state(self) -> np.ndarray:
+        """What a centralised critic sees of each world, (W, n): the task's `state`, or the observations of all agents."""
+        return self.obs.reshape(self.n_worlds, -1) if self._states is None else self._states[0]
+
+    @property
+    def final_central_state(self) -> np.ndarray:
+        """Like `central_state`, at the end of the last episode, with "same_step"."""
+        return self.final_obs.reshape(self.n_worlds, -1) if self._states is None else self._states[1]
 
     @property
     def params(self) -> dict[str, Any]:
@@ -361,25 +415,26 @@ class Swarm:
 
     def _end(self, due: np.ndarray | None) -> None:
         """Find the agents and worlds whose episode ends."""
-        task, now, state = self.task, self.now, self.simulation.state
+        task, now = self.task, self.now
         np.copyto(self.terminations, now.died)
-        over = np.zeros(self.n_worlds, bool)
-        if self._check_ends:
-            over |= self._are_decided()
-        ends = np.asarray(task.ends(now))
-        if ends.shape not in ((), over.shape) or ends.dtype != bool:
-            raise ParameterError(
-                f"{type(task).__name__}.ends returns {ends.dtype} of shape {ends.shape}; "
-                f"it returns truth values, {over.shape}, one per world"
-            )
-        over |= ends
-        self.terminations |= over[:, None] & self.alive
-        self.truncations[:] = self.late[:] = False
-        if task.n_steps:
-            np.greater(state.context.clock.step >= task.n_steps, over, out=self.late)
-            if self.late.any():
-                self.truncations |= self.late[:, None] & self.alive
-                over |= self.late
+        over = self._are_decided() if self._check_ends else np.zeros(self.n_worlds, bool)
+        if not self._never_ends:
+            ends = np.asarray(task.ends(now))
+            if ends.shape not in ((), over.shape) or ends.dtype != bool:
+                raise ParameterError(
+                    f"{type(task).__name__}.ends returns {ends.dtype} of shape {ends.shape}; "
+                    f"it returns truth values, {over.shape}, one per world"
+                )
+            over |= ends
+        if over.any():
+            self.terminations |= over[:, None] & self.alive
+        self.truncations.fill(False)
+        self.late.fill(False)
+        step = self.simulation.state.context.clock.step
+        if task.n_steps and step.max() >= task.n_steps:
+            np.greater(step >= task.n_steps, over, out=self.late)
+            self.truncations |= self.late[:, None] & self.alive
+            over |= self.late
         np.copyto(self.over, over)
 
     def _are_decided(self) -> np.ndarray:
@@ -425,6 +480,7 @@ class Swarm:
         self.now.id[...] = state["ids"]
         for name in self.KEPT:
             getattr(self, name)[...] = state[name]
+        self._look_ahead()
         self.is_fresh = False
 
     def __reduce__(self) -> tuple[Any, ...]:

@@ -14,6 +14,7 @@ from gymnasium import spaces
 from tussle.errors import ParameterError, listed, nearest_name
 from tussle.mission import Block, Mission, mission_of
 from tussle.rl.action import Act, Decoder, learned
+from tussle.rl.computed import Computed
 from tussle.rl.draws import variables_of
 from tussle.rl.observation import Component
 from tussle.rl.reward import Situation, Term
@@ -31,9 +32,12 @@ class Task:
         scripted: The mission of `evaluate` without a policy, in which autonomies play the agents' blocks; by default `mission`, also
             where a `mission` was given later than it, by a subclass or as an argument.
         learners: Names of the blocks whose entities are agents, separated by spaces; the others play by their autonomies.
-        observation: Components, in order; or one list per block.
+        observation: Components, in order; or lists of components by name, which environments give as a dict of arrays; or one of these
+            per block.
         action: What actions set; or one list per block. Blocks with an empty list play by their autonomies.
         reward: Terms by name.
+        policies: Name of the policy that plays each block, for `tussle train`; by default one policy plays all blocks of the same form.
+        state: What a centralised critic sees: a `Computed` whose function returns (W, n); by default the observations of all agents.
         decide_every: Steps of the mission per decision. Terms are evaluated once per decision, on the last state; events of all its
             steps count.
         time_limit: Length of an episode, after which it is truncated [s]; by default the mission's.
@@ -57,6 +61,8 @@ class Task:
     observation: ClassVar[Any] = ()
     action: ClassVar[Any] = ()
     reward: ClassVar[Mapping[str, Term]] = {}
+    policies: ClassVar[Mapping[str, str]] = {}
+    state: ClassVar[Computed | None] = None
     decide_every: int = 1
     time_limit: float | None = None
     vary: ClassVar[Sequence[str] | Mapping[str, Any]] = ()
@@ -89,6 +95,18 @@ class Task:
         """Worlds, (W,), whose episode terminates, besides those without agents; by default none."""
         return False
 
+    def action_mask(self, now: Situation) -> Any:
+        """Levels that agents may choose, (W, A, n) or a shape that broadcasts to it; by default there is no mask.
+
+        Those of all actions of an agent are side by side. Environments tell the mask; a level that it excludes is not refused.
+        """
+        return None
+
+    @property
+    def has_mask(self) -> bool:
+        """Whether the task masks actions."""
+        return type(self).action_mask is not Task.action_mask and any(d.free for d in self.decoders)
+
     def _check(self) -> None:
         where = type(self).__name__
         if self.decide_every < 1 or int(self.decide_every) != self.decide_every:
@@ -104,7 +122,21 @@ class Task:
         for name, term in self.reward.items():
             if not isinstance(term, Term):
                 raise ParameterError(f"{where}: reward {name!r} is {term!r}, not a Term")
+            if name.startswith("_"):  # "_NAME" is the mask of NAME in the infos of vector environments
+                raise ParameterError(f"{where}: reward {name!r}: the name of a term does not begin with _")
         _ = self.widths
+        known = [b.name for b in self.blocks]
+        for name in self.policies:
+            if name not in known:
+                raise ParameterError(
+                    f"{where}: policies: there is no block {name!r}{nearest_name(name, known)}; {listed(known)}"
+                )
+        if self.state is not None:
+            if not isinstance(self.state, Computed):
+                raise ParameterError(f"{where}: state is {self.state!r:.80}, not a Computed")
+            self.state.check()
+        if self.has_mask and any(d.is_continuous for d in self.decoders):
+            raise ParameterError(f"{where}: action_mask needs actions with levels")
 
     # -- what follows ------------------------------------------------------------------------------------------------------
 
@@ -153,28 +185,83 @@ class Task:
             raise ParameterError(f"{type(self).__name__}: learners is empty; {listed(have)}")
         return [b for b in self.given.blocks if b.name in names]
 
-    def _of(self, what: str, block: str, kind: type) -> list[Any]:
-        """Observation or action of a block."""
-        given = getattr(self, what)
-        if isinstance(given, Mapping):
+    def _of(self, what: str, block: str, kind: type) -> list[Any] | dict[str, list[Any]]:
+        """Observation or action of a block, by the names of its parts if they have names."""
+        where, given = type(self).__name__, getattr(self, what)
+        if isinstance(given, Mapping) and not (kind is Component and self._are_parts(given)):
             if block not in given:
-                raise ParameterError(
-                    f"{type(self).__name__}: {what} has nothing for {block!r}; {listed(given)}"
-                )
+                raise ParameterError(f"{where}: {what} has nothing for {block!r}; {listed(given)}")
             given = given[block]
-        items = list(given) if isinstance(given, Sequence) else [given]
-        for item in items:
+        parts = dict(given) if kind is Component and isinstance(given, Mapping) else {"": given}
+        found = {name: list(part) if isinstance(part, Sequence) else [part] for name, part in parts.items()}
+        for item in [item for items in found.values() for item in items]:
             if not isinstance(item, kind):
-                raise ParameterError(f"{type(self).__name__}: {what}: {item!r} is no {kind.__name__}")
-        if not items and kind is Component:
-            raise ParameterError(f"{type(self).__name__}: {what} of {block!r} is empty")
-        return items
+                raise ParameterError(f"{where}: {what}: {item!r} is no {kind.__name__}")
+        if kind is Component and not all([found, *found.values()]):
+            raise ParameterError(f"{where}: {what} of {block!r} is empty")
+        return found.get("", found)
+
+    def _are_parts(self, given: Mapping[str, Any]) -> bool:
+        """Whether the keys of a mapping name parts of an observation, and not blocks."""
+        return not {block.name for block in self.given.blocks} & set(given)
 
     def components(self, block: str) -> list[Component]:
-        return self._of("observation", block, Component)
+        """Components of a block's observation, in order."""
+        found = self._of("observation", block, Component)
+        return [item for items in found.values() for item in items] if isinstance(found, dict) else found
+
+    @cached_property
+    def parts(self) -> dict[str, dict[str, slice]]:
+        """Columns of each named part of the observation, by block; empty without names."""
+        found: dict[str, dict[str, slice]] = {}
+        for name, widths in self.widths.items():
+            given, first, n = self._of("observation", name, Component), 0, 0
+            found[name] = {}
+            for part, items in given.items() if isinstance(given, dict) else ():
+                end = first + sum(widths[n : n + len(items)])
+                found[name][part], first, n = slice(first, end), end, n + len(items)
+        return found
+
+    @cached_property
+    def roles(self) -> dict[str, list[str]]:
+        """Blocks of each policy, by its name; one policy "" for all blocks that observe and decide in the same form.
+
+        Raises:
+            ParameterError: Blocks of a policy differ in form.
+        """
+        forms = {d.block: (self.widths[d.block], str(d.space)) for d in self.decoders}
+        is_one = len({(sum(widths), space) for widths, space in forms.values()}) == 1
+        found: dict[str, list[str]] = {}
+        for name in forms:
+            found.setdefault(
+                self.policies.get(name, "" if is_one and not self.policies else name), []
+            ).append(name)
+        for policy, names in found.items():
+            if len({(sum(forms[name][0]), forms[name][1]) for name in names}) > 1:
+                raise ParameterError(
+                    f"{type(self).__name__}: policies: the blocks {' '.join(names)} of {policy!r} observe or decide differently; one "
+                    "policy needs the same form"
+                )
+        return found
+
+    def policy_of(self, agent: str) -> str:
+        """Name of the policy of an agent, such as "prey_3": a mapping as learning libraries take it."""
+        if agent not in self.agent_names:
+            raise ParameterError(f"there is no agent {agent!r}{nearest_name(agent, self.agent_names)}")
+        block = self.blocks[self.agent_block[self.agent_names.index(agent)]].name
+        return next(policy for policy, names in self.roles.items() if block in names)
 
     def acts(self, block: str) -> list[Act]:
-        return self._of("action", block, Act)
+        """Actions of a block, in order."""
+        return self._of("action", block, Act)  # type: ignore[return-value]
+
+    @cached_property
+    def columns(self) -> dict[str, list[tuple[Component, int]]]:
+        """Components of each block's observation, each with its first column."""
+        return {
+            name: list(zip(self.components(name), np.cumsum([0, *widths]).tolist(), strict=False))
+            for name, widths in self.widths.items()
+        }
 
     @cached_property
     def widths(self) -> dict[str, list[int]]:
@@ -218,10 +305,33 @@ class Task:
         """Number of the block of each agent, (A,), in `blocks`."""
         return np.repeat(np.arange(len(self.blocks)), self.capacities)
 
-    def observation_space(self, agent: int) -> spaces.Box:
-        """Observations of an agent; bounds are infinite where they do not follow from the components."""
-        low, high = self._bounds[self.blocks[self.agent_block[agent]].name]
-        return spaces.Box(low, high, dtype=self.dtype)
+    def observation_space(self, agent: int) -> spaces.Space[Any]:
+        """Observations of an agent, a Dict if its parts have names; bounds are infinite where they do not follow from the components."""
+        block = self.blocks[self.agent_block[agent]].name
+        low, high = self._bounds[block]
+        parts = self.parts[block]
+        if not parts:
+            return spaces.Box(low, high, dtype=self.dtype)
+        return spaces.Dict(
+            {name: spaces.Box(low[at], high[at], dtype=self.dtype) for name, at in parts.items()}
+        )
+
+    @property
+    def state_space(self) -> spaces.Box:
+        """What a centralised critic sees."""
+        low, high = self.limits if self.state is None else self.state.bounds(self.played, "")
+        return spaces.Box(
+            low.reshape(-1).astype(self.dtype), high.reshape(-1).astype(self.dtype), dtype=self.dtype
+        )
+
+    @cached_property
+    def limits(self) -> np.ndarray:
+        """Bounds of the observations of all agents, side by side, (2, A, numbers), 0 where a block has fewer."""
+        out = np.zeros((2, len(self.agent_names), max(sum(w) for w in self.widths.values())), self.dtype)
+        for a, block in enumerate(self.agent_block):
+            bounds = self._bounds[self.blocks[block].name]
+            out[:, a, : bounds.shape[1]] = bounds
+        return out
 
     @cached_property
     def _bounds(self) -> dict[str, np.ndarray]:

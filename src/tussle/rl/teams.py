@@ -176,7 +176,8 @@ def armies(count: int) -> Mission:
 
 def balance(now: Situation) -> np.ndarray:
     """Share of the red army that is alive less that of the blue one, (W, 1)."""
-    red, blue = (now.simulation.read(f"{name}.team")[1].mean(axis=1) for name in ("red", "blue"))
+    counts = {b.name: b.count for b in now.simulation.mission.blocks}
+    red, blue = (now.n_living(name) / counts[name] for name in ("red", "blue"))
     return np.asarray(red - blue)[:, None]
 
 

@@ -1,23 +1,25 @@
-"""Proximal policy optimization (PPO): one policy for all agents of a task, which play in one stack of worlds.
+"""Proximal policy optimization (PPO): a policy for all agents of a task, or one for each role, which play in one stack of worlds.
 
 The objective is that of Schulman, Wolski, Dhariwal, Radford and Klimov (2017), equation 7, with the generalized advantage estimates of
 Schulman, Moritz, Levine, Jordan and Abbeel (2016), equation 16. Each agent observes, decides and is rewarded by itself; critic and
-policy share no layers.
+policy share no layers. With `critic = "central"` the critic sees the state of the world as well (MAPPO: Yu and others 2022).
 """
 
 from __future__ import annotations
 
 import csv
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from tussle.errors import MissingExtraError, ParameterError
+from tussle.errors import MissingExtraError, ParameterError, listed
+from tussle.rl.actor_critic import ActorCritic
 from tussle.rl.policy_file import write_policy
+from tussle.rl.settings import Settings
 from tussle.rl.swarm import Swarm
 from tussle.rl.task import Task
 
@@ -29,148 +31,181 @@ except ImportError:
 
 CURVE = ("minutes", "decisions", "episodes", "episode_return", "reward_per_decision")
 """Columns of curve.csv."""
-
-
-@dataclass(frozen=True)
-class Settings:
-    """Settings of PPO.
-
-    Attributes:
-        worlds: Number of worlds.
-        decisions: Decisions of each agent between two updates.
-        epochs: Passes over these in an update.
-        minibatch: Decisions per gradient step.
-        hidden: Width of both hidden layers.
-        learning_rate: Of Adam at the beginning; it falls linearly with time to a tenth.
-        discount: Weight of a reward one decision later.
-        trace: Weight of an advantage estimate that looks one decision further, lambda.
-        clip: Largest change of a decision's probability that pays, as a share.
-        entropy: Weight of the policy's entropy.
-    """
-
-    worlds: int = 32
-    decisions: int = 128
-    epochs: int = 4
-    minibatch: int = 4096
-    hidden: int = 64
-    learning_rate: float = 1e-3
-    discount: float = 0.99
-    trace: float = 0.95
-    clip: float = 0.2
-    entropy: float = 0.0
-
-
-class ActorCritic:
-    """The policy, a multilayer perceptron, and the critic, another one.
-
-    Args:
-        width: Numbers of an observation.
-        sizes: Number of levels of each action; () for actions in ranges.
-        n_actions: Number of actions in ranges.
-        hidden: Width of the hidden layers.
-    """
-
-    def __init__(self, width: int, sizes: tuple[int, ...], n_actions: int, hidden: int) -> None:
-        self.sizes = sizes
-        self.policy = perceptron(width, hidden, sum(sizes) or n_actions, 0.01)
-        self.critic = perceptron(width, hidden, 1, 1.0)
-        self.log_std = nn.Parameter(torch.full((n_actions,), -1.0))
-        self.parameters = [*self.policy.parameters(), *self.critic.parameters(), self.log_std]
-
-    def distributions(self, obs: Any) -> list[Any]:
-        """Distributions of the actions, independent of each other."""
-        out = self.policy(obs)
-        if self.sizes:
-            return [torch.distributions.Categorical(logits=part) for part in out.split(self.sizes, -1)]
-        return [torch.distributions.Normal(out, self.log_std.exp())]
-
-    def log_prob(self, distributions: list[Any], actions: Any) -> Any:
-        """Logarithm of the density of actions, (m, n), as (m,)."""
-        if not self.sizes:
-            return distributions[0].log_prob(actions).sum(-1)
-        return sum(d.log_prob(actions[:, i]) for i, d in enumerate(distributions))
-
-    def state(self) -> dict[str, Any]:
-        return {
-            "policy": self.policy.state_dict(),
-            "critic": self.critic.state_dict(),
-            "log_std": self.log_std.data,
-        }
-
-    def load(self, state: dict[str, Any]) -> None:
-        self.policy.load_state_dict(state["policy"])
-        self.critic.load_state_dict(state["critic"])
-        self.log_std.data.copy_(state["log_std"])
-
-    def layers(self) -> list[tuple[np.ndarray, np.ndarray]]:
-        """Weights (outputs, inputs) and biases of the policy's layers."""
-        linear = [layer for layer in self.policy if isinstance(layer, nn.Linear)]
-        return [(layer.weight.detach().numpy(), layer.bias.detach().numpy()) for layer in linear]
-
-
-def perceptron(width: int, hidden: int, n_out: int, last: float) -> Any:
-    """Two hidden layers of tanh with orthogonal weights; `last` scales those of the output."""
-    layers: list[Any] = []
-    for n_in, n, gain in ((width, hidden, 2**0.5), (hidden, hidden, 2**0.5), (hidden, n_out, last)):
-        linear = nn.Linear(n_in, n)
-        nn.init.orthogonal_(linear.weight, gain)
-        nn.init.zeros_(linear.bias)
-        layers += [linear, nn.Tanh()]
-    return nn.Sequential(*layers[:-1])
+EVALUATIONS = ("minutes", "decisions", "episodes", "episode_return", "low", "high")
+"""Columns of evaluations.csv; low and high are the ends of the 95 % confidence interval of the mean."""
+FIRST_SEED = 9_000_001
+"""Of the episodes of evaluations, which no training plays: its seeds are hashes of 53 bits, or near `seed`."""
 
 
 @dataclass
 class Decisions:
-    """Decisions of living agents side by side, (m, ...)."""
+    """Decisions of living agents side by side, (m, ...); `states` are those of the worlds, of which `place` is the row, (m,)."""
 
     obs: Any
     actions: Any
     log_prob: Any
     advantages: Any
     returns: Any
+    place: Any
+    mask: Any
+    states: Any
+
+    def seen(self, some: Any) -> Any:
+        """What the critic sees of some decisions."""
+        return (
+            self.obs[some]
+            if self.states is None
+            else torch.cat([self.obs[some], self.states[self.place[some]]], -1)
+        )
+
+
+class Role:
+    """Policy and critic of some blocks, and what their agents see.
+
+    Args:
+        swarm: The worlds.
+        blocks: Names of the blocks, which observe and decide in the same form.
+        settings: Of PPO.
+    """
+
+    def __init__(self, swarm: Swarm, blocks: Sequence[str], settings: Settings) -> None:
+        task = swarm.task
+        numbers = [i for i, block in enumerate(task.blocks) if block.name in blocks]
+        self.agents = np.flatnonzero(np.isin(task.agent_block, numbers))
+        self.width, decoder = sum(task.widths[blocks[0]]), task.decoders[numbers[0]]
+        self.is_central = settings.critic == "central"
+        sizes = () if decoder.is_continuous else tuple(int(n) for n in decoder.sizes)
+        self.n_actions = len(decoder.free)
+        n_state = swarm.central_state.shape[1] if self.is_central else 0
+        self.model = ActorCritic(
+            self.width, sizes, self.n_actions if not sizes else 0, settings.hidden, n_state
+        )
+        self.optimizer = torch.optim.Adam(self.model.parameters, lr=settings.learning_rate, eps=1e-5)
+
+    def of(self, array: np.ndarray) -> Any:
+        """Values of the agents of this role, (W, A, ...), as (m, ...)."""
+        mine = np.ascontiguousarray(array[:, self.agents])
+        return torch.from_numpy(mine.reshape(-1, *mine.shape[2:]))
+
+    def obs(self, array: np.ndarray) -> Any:
+        return self.of(array)[:, : self.width].float()
+
+    def mask(self, swarm: Swarm) -> Any:
+        return None if swarm.masks is None else self.of(swarm.masks)[:, : sum(self.model.sizes)]
+
+    def seen(self, obs: Any, states: np.ndarray) -> Any:
+        """What the critic sees, (m, n), with the states of the worlds, (W, n)."""
+        if not self.is_central:
+            return obs
+        return torch.cat(
+            [obs, torch.from_numpy(states.astype(np.float32)).repeat_interleave(len(self.agents), 0)], -1
+        )
+
+
+class Rollout:
+    """What the agents of a role see, do and get in T decisions, (T, m, ...)."""
+
+    def __init__(self, role: Role, swarm: Swarm, n: int) -> None:
+        self.role, self.swarm, m = role, swarm, swarm.n_worlds * len(role.agents)
+        self.obs = torch.zeros(n, m, role.width)
+        kind = torch.long if role.model.sizes else torch.float32
+        self.actions = torch.zeros(n, m, role.n_actions, dtype=kind)
+        self.log_prob, self.rewards, self.values, self.later, self.goes_on, self.alive = torch.zeros(6, n, m)
+        self.mask = None if swarm.masks is None else torch.ones(n, m, sum(role.model.sizes), dtype=torch.bool)
+        self.states = torch.zeros(n, *swarm.central_state.shape) if role.is_central else None
+
+    def decide(self, t: int) -> np.ndarray:
+        """Draw actions, (W, agents, n)."""
+        role, swarm, model = self.role, self.swarm, self.role.model
+        self.obs[t], self.alive[t], mask = role.obs(swarm.obs), role.of(swarm.alive).float(), None
+        if self.mask is not None:
+            mask = self.mask[t] = role.mask(swarm)
+        if self.states is not None:
+            self.states[t] = torch.from_numpy(swarm.central_state.astype(np.float32))
+        with torch.no_grad():
+            distributions = model.distributions(self.obs[t], mask)
+            drawn = [d.sample() for d in distributions]
+            self.actions[t] = torch.stack(drawn, -1) if model.sizes else drawn[0]
+            self.log_prob[t] = model.log_prob(distributions, self.actions[t])
+            self.values[t] = model.critic(role.seen(self.obs[t], swarm.central_state))[:, 0]
+        return np.asarray(self.actions[t].numpy().reshape(swarm.n_worlds, len(role.agents), -1))
+
+    def note(self, t: int) -> None:
+        """Note what followed; a truncated episode would go on."""
+        role, swarm = self.role, self.swarm
+        over, terminated = swarm.over, role.of(swarm.terminations)
+        self.rewards[t] = role.of(swarm.rewards).float()
+        next_obs = role.obs(np.where(over[:, None, None], swarm.final_obs, swarm.obs))
+        states = (
+            np.where(over[:, None], swarm.final_central_state, swarm.central_state)
+            if role.is_central
+            else over
+        )
+        with torch.no_grad():
+            self.later[t] = role.model.critic(role.seen(next_obs, states))[:, 0]
+        self.later[t] *= (~terminated).float()
+        self.goes_on[t] = (~(terminated | torch.from_numpy(over).repeat_interleave(len(role.agents)))).float()
+
+    def decisions(self, discount: float, trace: float) -> Decisions:
+        """The decisions of the living, with their advantages."""
+        advantages, last = torch.zeros_like(self.rewards), torch.zeros_like(self.rewards[0])
+        for t in reversed(range(len(advantages))):
+            delta = self.rewards[t] + discount * self.later[t] - self.values[t]
+            last = advantages[t] = delta + discount * trace * self.goes_on[t] * last
+        there, n_worlds = self.alive.bool(), self.swarm.n_worlds
+        time, agent = there.nonzero(as_tuple=True)
+        parts = [
+            x[there] for x in (self.obs, self.actions, self.log_prob, advantages, advantages + self.values)
+        ]
+        place = time * n_worlds + agent // len(self.role.agents)
+        mask = None if self.mask is None else self.mask[there]
+        return Decisions(*parts, place, mask, None if self.states is None else self.states.flatten(0, 1))
 
 
 class Trainer:
-    """Trains a policy for a task.
+    """Trains the policies of a task.
 
     Args:
-        task: The task; all its blocks share the policy, so their observations and actions have the same form.
+        task: The task.
         name: How `Learned` finds the task: its registered id.
-        folder: Gets checkpoint.pt, curve.csv and policy.onnx.
+        folder: Gets checkpoint.pt, curve.csv, evaluations.csv, and policy.onnx, or NAME.onnx for each policy that the task names.
         seed: Of the worlds, the first weights and the exploration.
         settings: Of PPO.
 
+    Attributes:
+        roles: What learns, by the name of the policy.
+
     Raises:
-        ParameterError: The blocks differ in form.
+        ParameterError: Blocks of one policy differ in form.
     """
 
     def __init__(self, task: Task, name: str, folder: Path, seed: int, settings: Settings) -> None:
-        if (
-            len({(sum(w), str(d.space)) for w, d in zip(task.widths.values(), task.decoders, strict=True)})
-            > 1
-        ):
-            raise ParameterError(
-                f"{name}: the blocks {task.learners} observe or decide differently; one policy needs the same form"
-            )
         self.task, self.name, self.folder, self.seed, self.settings = task, name, folder, seed, settings
         torch.set_num_threads(1)
         torch.manual_seed(seed)
         self.swarm = Swarm(task, settings.worlds)
-        decoder = task.decoders[0]
-        sizes = () if decoder.is_continuous else tuple(int(n) for n in decoder.sizes)
-        n_actions = len(decoder.free) if decoder.is_continuous else 0
-        self.model = ActorCritic(self.swarm.obs.shape[-1], sizes, n_actions, settings.hidden)
-        self.optimizer = torch.optim.Adam(self.model.parameters, lr=settings.learning_rate, eps=1e-5)
+        self.roles = {role: Role(self.swarm, blocks, settings) for role, blocks in task.roles.items()}
         self.minutes, self.n_decisions, self.n_episodes = 0.0, 0, 0
         self.curve: list[list[float]] = []
+        self.evaluations: list[list[float]] = []
         self.begin(seed)
+
+    @property
+    def model(self) -> ActorCritic:
+        """The model of the only role.
+
+        Raises:
+            ParameterError: There are several.
+        """
+        if len(self.roles) > 1:
+            raise ParameterError(f"{self.name} has several policies; {listed(self.roles)}")
+        return next(iter(self.roles.values())).model
 
     def begin(self, seed: int) -> None:
         """Start episodes, and play world k of W for the share k / W of one, so that an update has decisions from all its phases."""
         swarm = self.swarm
         swarm.reset(seed)
-        shape = swarm.n_worlds, swarm.n_agents, swarm.action_width
-        idle = np.zeros(shape, np.float32 if swarm.is_continuous else np.int64)
+        idle = self._idle(swarm)
         n = self.task.n_steps // self.task.decide_every
         begins = n - n * np.arange(swarm.n_worlds) // swarm.n_worlds
         for t in range(n):
@@ -179,103 +214,134 @@ class Trainer:
                 swarm.reset(None, due)
             swarm.step(idle)
 
+    @staticmethod
+    def _idle(swarm: Swarm) -> np.ndarray:
+        shape = swarm.n_worlds, swarm.n_agents, swarm.action_width
+        return np.zeros(shape, np.float32 if swarm.is_continuous else np.int64)
+
     # -- playing -----------------------------------------------------------------------------------------------------------
 
-    def play(self) -> tuple[Decisions, float, float]:
-        """Play `decisions` decisions. Returns them, the mean return of the episodes that ended, and the mean reward."""
+    def play(self) -> tuple[dict[str, Decisions], float, float]:
+        """Play `decisions` decisions. Returns them by role, the mean return of the episodes that ended, and the mean reward."""
         swarm, s = self.swarm, self.settings
-        shape = s.decisions, swarm.n_worlds * swarm.n_agents
-        obs = torch.zeros(*shape, swarm.obs.shape[-1])
-        actions = torch.zeros(
-            *shape, swarm.action_width, dtype=torch.long if self.model.sizes else torch.float32
-        )
-        log_prob, rewards, values, later, goes_on, alive = torch.zeros(6, *shape)
+        rollouts = {name: Rollout(role, swarm, s.decisions) for name, role in self.roles.items()}
         ended: list[float] = []
+        actions = self._idle(swarm)
         for t in range(s.decisions):
-            obs[t] = torch.from_numpy(swarm.obs.reshape(shape[1], -1).astype(np.float32))
-            alive[t] = torch.from_numpy(swarm.alive.reshape(-1).astype(np.float32))
-            with torch.no_grad():
-                distributions = self.model.distributions(obs[t])
-                drawn = [d.sample() for d in distributions]
-                actions[t] = torch.stack(drawn, -1) if self.model.sizes else drawn[0]
-                log_prob[t] = self.model.log_prob(distributions, actions[t])
-                values[t] = self.model.critic(obs[t])[:, 0]
-            chosen = actions[t].numpy().reshape(swarm.n_worlds, swarm.n_agents, -1)
-            _, reward, terminated, _, _ = swarm.step(chosen)
-            rewards[t] = torch.from_numpy(reward.reshape(-1).astype(np.float32))
-            next_obs = np.where(swarm.over[:, None, None], swarm.final_obs, swarm.obs).reshape(shape[1], -1)
-            with torch.no_grad():  # of what follows; a truncated episode would go on
-                later[t] = self.model.critic(torch.from_numpy(next_obs.astype(np.float32)))[:, 0]
-            later[t] *= torch.from_numpy(~terminated.reshape(-1)).float()
-            goes_on[t] = torch.from_numpy(~(terminated | swarm.over[:, None]).reshape(-1)).float()
+            for rollout in rollouts.values():
+                actions[:, rollout.role.agents, : rollout.role.n_actions] = rollout.decide(t)
+            swarm.step(actions)
+            for rollout in rollouts.values():
+                rollout.note(t)
             ended += swarm.returns[swarm.over].sum(axis=-1).tolist()
-        self.n_decisions += int(alive.sum())
+        there = [rollout.alive.bool() for rollout in rollouts.values()]
+        self.n_decisions += sum(int(each.sum()) for each in there)
         self.n_episodes += len(ended)
-        advantages, last = torch.zeros(shape), torch.zeros(shape[1])
-        for t in reversed(range(s.decisions)):
-            delta = rewards[t] + s.discount * later[t] - values[t]
-            last = advantages[t] = delta + s.discount * s.trace * goes_on[t] * last
-        there = alive.bool()
-        parts = [x[there] for x in (obs, actions, log_prob, advantages, advantages + values)]
-        return Decisions(*parts), float(np.mean(ended)) if ended else np.nan, float(rewards[there].mean())
+        gained = [r.rewards[each] for r, each in zip(rollouts.values(), there, strict=True)]
+        batches = {name: rollout.decisions(s.discount, s.trace) for name, rollout in rollouts.items()}
+        return batches, float(np.mean(ended)) if ended else np.nan, float(torch.cat(gained).mean())
+
+    def evaluate(self) -> np.ndarray:
+        """Play episodes with the most likely actions, and return the sum of rewards of each, (evaluate_episodes,)."""
+        n = self.settings.evaluate_episodes
+        with Swarm(self.task, n, autoreset="disabled") as swarm:
+            swarm.reset(FIRST_SEED)
+            actions, is_over, returns = self._idle(swarm), np.zeros(n, bool), np.zeros(n)
+            while not is_over.all():
+                for role in self.roles.values():
+                    with torch.no_grad():
+                        chosen = role.model.most_likely(role.obs(swarm.obs), role.mask(swarm)).numpy()
+                    actions[:, role.agents, : role.n_actions] = chosen.reshape(n, len(role.agents), -1)
+                swarm.step(actions)
+                returns += np.where(is_over, 0.0, swarm.rewards.sum(axis=1, dtype=float))
+                is_over |= swarm.over
+        return returns
 
     # -- learning ----------------------------------------------------------------------------------------------------------
 
-    def update(self, batch: Decisions, share: float) -> None:
-        """Improve policy and critic; `share` of the time is over."""
-        s = self.settings
-        for group in self.optimizer.param_groups:
+    def update(self, role: Role, batch: Decisions, share: float) -> None:
+        """Improve policy and critic of a role; `share` of the time is over."""
+        s, model = self.settings, role.model
+        for group in role.optimizer.param_groups:
             group["lr"] = s.learning_rate * (1.0 - 0.9 * share)
         for _ in range(s.epochs):
             for some in torch.randperm(len(batch.log_prob)).split(s.minibatch):
-                distributions = self.model.distributions(batch.obs[some])
-                ratio = (self.model.log_prob(distributions, batch.actions[some]) - batch.log_prob[some]).exp()
+                mask = None if batch.mask is None else batch.mask[some]
+                distributions = model.distributions(batch.obs[some], mask)
+                ratio = (model.log_prob(distributions, batch.actions[some]) - batch.log_prob[some]).exp()
                 gain = batch.advantages[some]
                 gain = (gain - gain.mean()) / (gain.std(correction=0) + 1e-8)
                 clipped = ratio.clamp(1.0 - s.clip, 1.0 + s.clip)
-                value = self.model.critic(batch.obs[some])[:, 0]
+                value = model.critic(batch.seen(some))[:, 0]
                 entropy = sum(d.entropy().mean() for d in distributions)
                 loss = -torch.minimum(gain * ratio, gain * clipped).mean() - s.entropy * entropy
                 loss = loss + 0.5 * (value - batch.returns[some]).square().mean()
-                self.optimizer.zero_grad()
+                role.optimizer.zero_grad()
                 loss.backward()
-                nn.utils.clip_grad_norm_(self.model.parameters, 0.5)
-                self.optimizer.step()
+                nn.utils.clip_grad_norm_(model.parameters, 0.5)
+                role.optimizer.step()
 
     def train(self, minutes: float, tell: Callable[[dict[str, float]], bool]) -> None:
         """Train until `minutes` are over, those before a checkpoint included; at least one update.
 
         Args:
-            minutes: Wall time [min].
-            tell: Called after each update with the new line of the curve, by its columns; ends the training where it returns true.
+            minutes: Wall time without evaluations [min].
+            tell: Called after each update with the new line of the curve, by its columns, and after an evaluation with "low" and "high",
+                the ends of the 95 % interval of "evaluated", the mean return; ends the training where it returns true.
         """
         began, before = time.monotonic(), self.minutes
-        is_due = True
+        is_due, every = True, self.settings.evaluate_every
         while is_due:
-            batch, episode_return, reward = self.play()
-            self.update(batch, min(1.0, self.minutes / minutes))
+            batches, episode_return, reward = self.play()
+            for name, batch in batches.items():
+                if len(batch.log_prob):
+                    self.update(self.roles[name], batch, min(1.0, self.minutes / minutes))
             self.minutes = before + (time.monotonic() - began) / 60.0
             self.curve.append(
                 [self.minutes, float(self.n_decisions), float(self.n_episodes), episode_return, reward]
             )
-            is_stopped = tell(dict(zip(CURVE, self.curve[-1], strict=True)))
-            is_due = self.minutes < minutes and not is_stopped
+            line = dict(zip(CURVE, self.curve[-1], strict=True))
+            if every and len(self.curve) % every == 0:
+                paused = time.monotonic()
+                line |= self._evaluated()
+                began += time.monotonic() - paused
+            is_due = not tell(line) and self.minutes < minutes
             if not is_due or len(self.curve) % 20 == 0:
                 self.save()
 
+    def _evaluated(self) -> dict[str, float]:
+        """Evaluate, and note the mean with its interval."""
+        from scipy.stats import t as student_t  # it looks for PyTorch when it is imported
+
+        returns = self.evaluate()
+        mean, n = float(returns.mean()), len(returns)
+        half = float(student_t.ppf(0.975, n - 1) * returns.std(ddof=1) / n**0.5) if n > 1 else np.inf
+        self.evaluations.append([*self.curve[-1][:2], float(n), mean, mean - half, mean + half])
+        return {"evaluated": mean, "low": mean - half, "high": mean + half}
+
     # -- files -------------------------------------------------------------------------------------------------------------
 
+    @property
+    def files(self) -> dict[str, Path]:
+        """File of each policy, by its name."""
+        return {name: self.folder / f"{name or 'policy'}.onnx" for name in self.roles}
+
     def save(self) -> None:
-        """Write checkpoint.pt, curve.csv and policy.onnx."""
+        """Write checkpoint.pt, curve.csv, evaluations.csv and the policies."""
         self.folder.mkdir(parents=True, exist_ok=True)
-        state = {"model": self.model.state(), "optimizer": self.optimizer.state_dict(), "settings": asdict(self.settings),
-                 "task": self.name, "counts": [self.minutes, self.n_decisions, self.n_episodes], "curve": self.curve,
-                 "random": torch.get_rng_state()}  # fmt: skip
+        roles = {name: [role.model.state(), role.optimizer.state_dict()] for name, role in self.roles.items()}
+        state = {"roles": roles, "settings": asdict(self.settings), "task": self.name,
+                 "counts": [self.minutes, self.n_decisions, self.n_episodes], "curve": self.curve,
+                 "evaluations": self.evaluations, "random": torch.get_rng_state()}  # fmt: skip
         torch.save(state, self.folder / "checkpoint.new")
         (self.folder / "checkpoint.new").replace(self.folder / "checkpoint.pt")
-        with (self.folder / "curve.csv").open("w", newline="", encoding="utf-8") as file:
-            csv.writer(file).writerows([CURVE, *self.curve])
-        write_policy(self.folder / "policy.onnx", self.model.layers(), task=self.name)
+        tables = {"curve": (CURVE, self.curve), "evaluations": (EVALUATIONS, self.evaluations)}
+        for table, (columns, lines) in tables.items():
+            if lines:
+                with (self.folder / f"{table}.csv").open("w", newline="", encoding="utf-8") as file:
+                    csv.writer(file).writerows([columns, *lines])
+        for name, path in self.files.items():
+            write_policy(path, self.roles[name].model.layers(), task=self.name)
 
     def resume(self) -> None:
         """Continue from checkpoint.pt; worlds begin new episodes.
@@ -292,10 +358,11 @@ class Trainer:
             raise ParameterError(
                 f"{path} is of {state['task']} with {state['settings']}; resume with the same task and settings"
             )
-        self.model.load(state["model"])
-        self.optimizer.load_state_dict(state["optimizer"])
+        for name, (model, optimizer) in state["roles"].items():
+            self.roles[name].model.load(model)
+            self.roles[name].optimizer.load_state_dict(optimizer)
         self.minutes, self.n_decisions, self.n_episodes = state["counts"]
-        self.curve = state["curve"]
+        self.curve, self.evaluations = state["curve"], state["evaluations"]
         torch.set_rng_state(state["random"])
         self.begin(self.seed + self.n_episodes + self.settings.worlds)
 

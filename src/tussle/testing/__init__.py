@@ -1,4 +1,4 @@
-"""For a plugin author's own tests: `check_plugin(MyPlugin)` checks a plugin against the contract."""
+"""Conformance checks for tests of plugin authors: `check_plugin(MyPlugin)` checks a plugin against the contract."""
 
 from tussle.testing.check import check_plugin
 

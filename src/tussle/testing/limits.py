@@ -37,7 +37,7 @@ class Case:
 
 
 def check_limits(game: ConformanceGame) -> None:
-    """With each parameter at its finite bounds, and at 0.1 and 10 times its default, all columns and bodies stay finite.
+    """Check that all columns stay finite with each parameter at its finite bounds, and at 0.1 and 10 times its default.
 
     Raises:
         ConformanceError: A number is not finite, or the plugin raises an error.
@@ -46,7 +46,7 @@ def check_limits(game: ConformanceGame) -> None:
 
 
 def check_extremes(game: ConformanceGame) -> None:
-    """With each parameter at 0, its default's negative, and the smallest and largest numbers, the first step is finite or refused.
+    """Check that the first step is finite or refused with each parameter at 0, its negated default, and extreme numbers.
 
     Raises:
         ConformanceError: A number is not finite, or the plugin raises an error.

@@ -12,7 +12,7 @@ from tussle.engine.simulation import Simulation
 from tussle.engine.step_end import world_result
 from tussle.errors import PluginError
 from tussle.view.entity import EntityState, Reading, entity_state
-from tussle.view.frame import Lens
+from tussle.view.frame import FrameReader
 from tussle.view.pacing import Allowance
 from tussle.view.series import CurveName, StepSeries
 
@@ -39,7 +39,7 @@ class GameCurves:
 
     def __init__(self, simulation: Simulation, world: int, note: Callable[[str], None]) -> None:
         self._simulation, self._world, self._note = simulation, world, note
-        self._lens = Lens(simulation, world)
+        self._reader = FrameReader(simulation, world)
         self._allowance = Allowance(READING_SHARE)
         self._watched: dict[int, set[str]] = {}
         self.clear()
@@ -107,7 +107,7 @@ class GameCurves:
 
     def _count(self, step: int) -> None:
         """Count the entities left and born, of each team."""
-        _, who = self._lens.look()
+        _, who = self._reader.read()
         if who is self._who:
             return
         self._who, state = who, self._simulation.state

@@ -19,7 +19,7 @@ from tussle.engine.table import Stored, Table
 
 _COMPONENTS = {3: ("x", "y", "z"), 4: ("w", "x", "y", "z")}
 """Names of the components of a vector and of a quaternion."""
-MOST_MESSAGES = 50
+MAX_MESSAGES = 50
 """Messages that are listed, of received and of sent ones."""
 
 
@@ -71,8 +71,8 @@ class EntityState:
         block: Name of its block.
         body: Column -> reading.
         plugins: Plugin, such as "MotorSchemas.AvoidEntityMS" -> column -> reading.
-        heard: Messages that have arrived and are unread, at most 50.
-        said: Its messages that are under way or unread, at most 50.
+        received: Messages that have arrived and are unread, at most 50.
+        sent: Its messages that are under way or unread, at most 50.
     """
 
     t: float
@@ -82,8 +82,8 @@ class EntityState:
     block: str
     body: dict[str, Reading]
     plugins: dict[str, dict[str, Reading]] = field(default_factory=dict)
-    heard: list[ShownMessage] = field(default_factory=list)
-    said: list[ShownMessage] = field(default_factory=list)
+    received: list[ShownMessage] = field(default_factory=list)
+    sent: list[ShownMessage] = field(default_factory=list)
 
 
 def entity_state(
@@ -125,13 +125,13 @@ def entity_state(
         if parked is None:
             if group.first <= row < group.last:
                 _read_plugins(group, row - group.first, group.table, state.plugins)
-                state.heard.extend(_heard(group, world, who) if has_messages else ())
+                state.received.extend(_received(group, world, who) if has_messages else ())
         elif group.key in parked.tables:
             rows, held = parked.tables[group.key]
             place = np.flatnonzero(rows == row)
             if len(place):
                 _read_plugins(group, int(place[0]), held, state.plugins)
-    state.said.extend(_said(simulation, world, who) if has_messages else ())
+    state.sent.extend(_sent(simulation, world, who) if has_messages else ())
     return state
 
 
@@ -171,7 +171,7 @@ def _read_plugins(group: Group, row: int, held: Table | Stored, into: dict[str, 
                 columns[name] = Reading(binding.spec.values[name], **about)
 
 
-def _heard(group: Group, world: int, who: int) -> list[ShownMessage]:
+def _received(group: Group, world: int, who: int) -> list[ShownMessage]:
     messages: list[ShownMessage] = []
     for binding in group.walk():
         for name, column in type(binding.spec).columns.items():
@@ -179,7 +179,7 @@ def _heard(group: Group, world: int, who: int) -> list[ShownMessage]:
                 inbox = binding.plugin.__dict__[name]
                 for delivery in inbox.deliveries:
                     messages += _messages(inbox.topic, delivery, _for_whom(delivery, world, who))
-    return messages[-MOST_MESSAGES:]
+    return messages[-MAX_MESSAGES:]
 
 
 def _for_whom(delivery: Delivery, world: int, who: int) -> np.ndarray:
@@ -193,13 +193,13 @@ def _for_whom(delivery: Delivery, world: int, who: int) -> np.ndarray:
     return np.asarray(number[(receiver == who) & (batch.world[number] == world)])
 
 
-def _said(simulation: Simulation, world: int, who: int) -> list[ShownMessage]:
+def _sent(simulation: Simulation, world: int, who: int) -> list[ShownMessage]:
     messages: list[ShownMessage] = []
     for topic in simulation.state.message_bus.topics.values():
         for delivery in _under_way(topic):
             mine = (delivery.batch.world == world) & (delivery.batch.sender == who)
             messages += _messages(topic, delivery, np.flatnonzero(mine))
-    return messages[-MOST_MESSAGES:]
+    return messages[-MAX_MESSAGES:]
 
 
 def _under_way(topic: TopicBuffer) -> Iterator[Delivery]:
@@ -213,7 +213,7 @@ def _under_way(topic: TopicBuffer) -> Iterator[Delivery]:
 def _messages(topic: TopicBuffer, delivery: Delivery, numbers: np.ndarray) -> list[ShownMessage]:
     batch = delivery.batch
     messages = []
-    for i in numbers[-MOST_MESSAGES:]:
+    for i in numbers[-MAX_MESSAGES:]:
         fields: dict[str, Any] = {}
         for name, values in batch.data.items():
             if isinstance(values, RaggedColumn):

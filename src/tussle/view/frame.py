@@ -70,7 +70,7 @@ def empty_frame(t: float, step: int) -> Frame:
     return Frame(t, step, none, none, none, np.zeros((0, 3)), np.zeros((0, 4)), np.zeros((0, 3)), np.zeros(0))
 
 
-class Lens:
+class FrameReader:
     """Makes frames of one world of a simulation. Rows are looked up again only after births and removals.
 
     Args:
@@ -84,7 +84,7 @@ class Lens:
         self.order: np.ndarray | None = None
         self._who: tuple[np.ndarray, ...] = ()
 
-    def look(self) -> tuple[np.ndarray, tuple[np.ndarray, ...]]:
+    def read(self) -> tuple[np.ndarray, tuple[np.ndarray, ...]]:
         """Real columns of the table that holds the world, (22, n), and id, team and block of its entities, each (m,), int32.
 
         `order` then has their rows in that table; None if these are all rows in order.
@@ -104,7 +104,7 @@ class Lens:
 
     def frame(self) -> Frame:
         """A copy of the present state; of a world that has ended, its last state."""
-        floats, who = self.look()
+        floats, who = self.read()
         clock = self._simulation.state.context.clock
         step = int(clock.step[self._world])
         columns = []
@@ -123,4 +123,4 @@ def _closed(array: np.ndarray) -> np.ndarray:
 
 def frame_of(simulation: Simulation, world: int = 0) -> Frame:
     """A copy of the present state of a world; of one that has ended, its last state."""
-    return Lens(simulation, world).frame()
+    return FrameReader(simulation, world).frame()

@@ -4,23 +4,26 @@ from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import cached_property
 from typing import Any, Self
 
 import numpy as np
 
 from tussle.declare.messages import CustomKeyPress, Message, WorldPointClicked
+from tussle.documents import POSITIVE, check_argument
 from tussle.engine.result import WorldResult
 from tussle.engine.simulation import Simulation
 from tussle.engine.step_end import world_result
 from tussle.errors import ParameterError, PluginError
+from tussle.pacing import Pace
+from tussle.record.inputs import ExternalInput
 from tussle.view.curves import GameCurves
 from tussle.view.drawn import DrawCollector, Shape
 from tussle.view.entity import EntityState, entity_state
-from tussle.view.frame import Event, Frame, Lens
+from tussle.view.frame import Event, Frame, FrameReader
 from tussle.view.latest import LINGER, LatestValue
-from tussle.view.pacing import Pace, checked_warp, faster, slower
+from tussle.view.pacing import checked_warp, faster, slower
 from tussle.view.playback import Order, PlaybackController
 from tussle.view.player import Injection, Player
 from tussle.view.scenery import Scenery, scenery_of
@@ -34,7 +37,7 @@ STATE_PERIOD = 0.1
 """Least time between two readings of an entity [s]."""
 RESULT_PERIOD = 0.5
 """Least time between two provisional results [s]."""
-FORGET_AFTER = 10.0
+FORGET_TIME = 10.0
 """Time after the last request at which the state of an entity is dropped [s]."""
 
 
@@ -60,6 +63,8 @@ class Live:
         snapshot_every: Least simulated time between snapshots [s]; they are also limited to 1 % of the CPU time.
         memory: Memory for snapshots and past frames [MB], half of it for each.
         viewer: Viewer tags of the mission file, see `tussle.mission.Loaded`.
+        inputs: What came from outside in a recorded run of the game, see `tussle.record.load_inputs`; it comes again, until a message
+            or a reset takes the game on another course.
 
     Raises:
         ParameterError: A value is not allowed.
@@ -77,10 +82,10 @@ class Live:
         snapshot_every: float = 1.0,
         memory: float = 256.0,
         viewer: Mapping[str, Any] | None = None,
+        inputs: Sequence[ExternalInput] = (),
     ) -> None:
-        for name, value in (("snapshot_every", snapshot_every), ("memory", memory)):
-            if not 0.0 < value < math.inf:
-                raise ParameterError(f"{name} = {value!r} is not allowed; it takes a number > 0")
+        check_argument("snapshot_every", snapshot_every, POSITIVE)
+        check_argument("memory", memory, POSITIVE)
         if not 0 <= world < simulation.n_worlds:
             raise ParameterError(
                 f"world = {world!r} is not allowed; there are worlds 0 to {simulation.n_worlds - 1}"
@@ -89,10 +94,12 @@ class Live:
         self._clock = simulation.state.context.clock
         self._collector = DrawCollector(simulation, world)
         self._pace = Pace(checked_warp(pace))
-        self._player = Player(simulation, world, snapshot_every, 1e6 * memory)
+        self._player = Player(simulation, world, snapshot_every, 1e6 * memory, inputs)
         self._playback = PlaybackController(self._player, self._pace, self._collector, is_paused, self._renew)
         ring = self._playback.ring
-        self._frame: LatestValue[Frame] = LatestValue(Lens(simulation, world).frame, FRAME_PERIOD, ring)
+        self._frame: LatestValue[Frame] = LatestValue(
+            FrameReader(simulation, world).frame, FRAME_PERIOD, ring
+        )
         self._shapes: LatestValue[tuple[Shape, ...]] = LatestValue(self._collector.shapes, FRAME_PERIOD, ring)
         self._result: LatestValue[WorldResult | None] = LatestValue(self._make_result, RESULT_PERIOD, ring)
         self._entities: dict[int, LatestValue[EntityState | None]] = {}
@@ -389,7 +396,7 @@ class Live:
         else:
             self._collector.close()
         for who, latest in list(self._entities.items()):
-            if latest.idle_for > FORGET_AFTER:
+            if latest.idle_for > FORGET_TIME:
                 self._entities.pop(who, None)
 
     def _make_result(self) -> WorldResult | None:

@@ -1,4 +1,4 @@
-"""Wall time and simulated time: waiting, measured speed, CPU shares."""
+"""Speeds of a game: those that are set, the one that is measured, and the CPU time that is left for other work."""
 
 from __future__ import annotations
 
@@ -9,43 +9,12 @@ from typing import Any
 
 from tussle.errors import ParameterError
 
-MOST_LAG = 0.25
-"""Delay up to which a game catches up [s]; a larger delay is dropped."""
 WINDOW = 1.0
 """Wall time over which speed is measured [s]."""
 MOMENT = 0.0005
 """Least time between two checks of the saved CPU time [s]."""
 TICK = 0.05
 """Least time between two readings of the speed [s]."""
-
-
-class Pace:
-    """Computes how long to wait so that simulated time passes `warp` times as fast as wall time.
-
-    Args:
-        warp: Simulated seconds per second; inf is as fast as possible.
-    """
-
-    def __init__(self, warp: float) -> None:
-        self.warp = warp
-        self._anchor: tuple[float, float] | None = None
-
-    def restart(self) -> None:
-        """Count from the next step."""
-        self._anchor = None
-
-    def wait(self, t: float, dt: float) -> float:
-        """Time until the step from t to t + dt is due [s]; 0 or less when it is."""
-        if math.isinf(self.warp):
-            return 0.0
-        now = time.perf_counter()
-        if self._anchor is None:
-            self._anchor = (now, t)
-        began, t_began = self._anchor
-        left = began + (t + dt - t_began) / self.warp - now
-        if left < -MOST_LAG:
-            self._anchor = (now, t + dt)
-        return left
 
 
 class Speedometer:

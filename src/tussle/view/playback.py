@@ -12,11 +12,12 @@ from typing import Any
 
 from tussle.declare.messages import Message
 from tussle.errors import PluginError, TussleError
+from tussle.pacing import Pace
 from tussle.view.drawn import DrawCollector
-from tussle.view.pacing import Pace, Speedometer
+from tussle.view.pacing import Speedometer
 from tussle.view.player import Player
 
-LONGEST_WAIT = 60.0
+MAX_WAIT = 60.0
 """Time for which it sleeps at once [s]: no clock of the system counts to the next step of a game that is all but stopped."""
 BURST = 0.004
 """Time for which steps are made before anything else is looked after [s]: short against the 33 ms between two frames."""
@@ -119,7 +120,7 @@ class PlaybackController:
 
     def _sleep(self) -> None:
         began = time.perf_counter()
-        self._bell.wait(None if self._wait is None else min(self._wait, LONGEST_WAIT))
+        self._bell.wait(None if self._wait is None else min(self._wait, MAX_WAIT))
         self.player.rest(time.perf_counter() - began)
 
     def follow(self) -> None:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from tussle.declare.displays import counted
 from tussle.declare.messages import Message, Messages
 from tussle.engine.simulation import Simulation
 from tussle.record import Events
@@ -15,9 +17,9 @@ from tussle.view.frame import Event, frame_of
 from tussle.view.timeline import History, Timeline
 
 if TYPE_CHECKING:
-    from tussle.record import Recorder
+    from tussle.record import ExternalInput, Recorder
 
-MOST_EVENTS = 100_000
+MAX_EVENTS = 100_000
 """Events up to which collisions are kept."""
 
 
@@ -53,6 +55,7 @@ class Player:
         world: Number of the world that is shown; the game ends with it.
         every: Least simulated time between snapshots [s].
         limit: Memory for snapshots and for frames [B], half of it for each.
+        inputs: What came from outside in a recorded run of the game; it comes again until a message takes the game on another course.
 
     Attributes:
         timeline: Snapshots.
@@ -65,11 +68,19 @@ class Player:
         is_broken: A step failed; the game can only be rewound.
     """
 
-    def __init__(self, simulation: Simulation, world: int, every: float, limit: float) -> None:
+    def __init__(
+        self,
+        simulation: Simulation,
+        world: int,
+        every: float,
+        limit: float,
+        inputs: Sequence[ExternalInput] = (),
+    ) -> None:
         self.simulation, self.world = simulation, world
         self.timeline = Timeline(simulation, world, every, 0.5 * limit)
         self.history = History(simulation, world, 0.5 * limit)
         self.injections: list[Injection] = []
+        self._inputs = list(inputs)
         self.events: list[Event] = []
         self.notes: list[str] = []
         self.curves = GameCurves(simulation, world, self.note)
@@ -108,6 +119,9 @@ class Player:
         sim.events.is_replaying = step < self._furthest_step
         self._furthest_step = max(self._furthest_step, step + 1)
         try:
+            for given in self._inputs:
+                if given.step == step:
+                    sim.play_input(given, self.world)
             for sent in self.injections:
                 if sent.step == step:
                     sim.publish(
@@ -187,6 +201,11 @@ class Player:
             return
         self._check(type_, network, topic, fields)
         step = self.step
+        if dropped := [given for given in self._inputs if given.step >= step]:
+            self._inputs = [given for given in self._inputs if given.step < step]
+            self.note(
+                f"{counted(len(dropped), 'recorded input')} after this moment will not come: the game takes another course"
+            )
         if step < self._furthest_step:
             self._end_recordings()
             for part in (self.timeline, self.history, self.curves):
@@ -207,6 +226,7 @@ class Player:
         for part in (self.timeline, self.history, self.curves):
             part.clear()
         self.injections.clear()
+        self._inputs.clear()
         self.events.clear()
         self.is_broken = False
         self.simulation.reset([self.world], None if seed is None else [seed])
@@ -260,8 +280,8 @@ class Player:
         for i in range(len(reported)):
             if reported.world[i] != self.world:
                 continue
-            if len(self.events) >= MOST_EVENTS and reported.kind == "collision":
-                self.note(f"collisions after event {MOST_EVENTS} are not kept")
+            if len(self.events) >= MAX_EVENTS and reported.kind == "collision":
+                self.note(f"collisions after event {MAX_EVENTS} are not kept")
                 return
             if reported.step[i] < self.step and not self.simulation.events.is_replaying:
                 self._begin_episode(int(reported.step[i]))

@@ -26,9 +26,9 @@ from tussle.view.scenery import Scenery, scenery_of
 from tussle.view.sight import fields_of_view
 from tussle.view.style import Style
 
-MOST_EMPTY = 5_000_000
+MAX_EMPTY = 5_000_000
 """Frames without entities that are added, in memory about 300 MB."""
-MOST_SAMPLED = 60
+MAX_SAMPLED = 60
 """Frames that are sampled of a run that stays in its file."""
 POS, QUAT, VEL = ("x", "y", "z"), ("qw", "qx", "qy", "qz"), ("vx", "vy", "vz")
 
@@ -51,7 +51,7 @@ class Recording:
         world: Number of the world.
         plugin_files: Python files with plugins of the run's mission; by default those that the directory holds, if the user's own.
         is_mapped: States stay in their file and are checked when a frame is made of them, so a run of any size opens at once. Extent
-            and teams are then those of at most `MOST_SAMPLED` frames, evenly spaced.
+            and teams are then those of at most `MAX_SAMPLED` frames, evenly spaced.
 
     Attributes:
         run: The run directory as it was loaded.
@@ -171,10 +171,10 @@ class Recording:
         edges = np.concatenate([self.steps, [self._last_step() + 1]])
         gaps = np.flatnonzero(np.diff(edges) > stride)
         n_missing = int((np.diff(edges)[gaps] // stride).sum())
-        if n_missing > MOST_EMPTY:
+        if n_missing > MAX_EMPTY:
             raise RecordError(
                 f"{self.path}: {n_missing:,} frames without entities, by the steps of {RUN_FILE} and {TRAJECTORY_FILE}; "
-                f"allowed are {MOST_EMPTY:,}"
+                f"allowed are {MAX_EMPTY:,}"
             )
         missing = [np.arange(edges[i] + stride, edges[i + 1], stride) for i in gaps]
         end = self._last_step()
@@ -235,7 +235,7 @@ class Recording:
     @property
     def _sample(self) -> list[int]:
         """Numbers of the sampled frames."""
-        places = np.linspace(0, self.n_frames - 1, min(self.n_frames, MOST_SAMPLED))
+        places = np.linspace(0, self.n_frames - 1, min(self.n_frames, MAX_SAMPLED))
         return [int(i) for i in np.unique(places.astype(np.int64))]
 
     def _teams_sampled(self) -> set[tuple[int, int]]:
@@ -461,7 +461,10 @@ class Recording:
             return None
         try:
             loaded = read_mission(
-                path.resolve(), strict=False, plugin_files=self._plugin_files or self._own_plugins()
+                path.resolve(),
+                strict=False,
+                plugin_files=self._plugin_files or self._own_plugins(),
+                plays=False,
             )
             self.notes.extend(note for note in loaded.notes if "<terrain>" in note)
             return loaded

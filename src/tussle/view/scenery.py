@@ -12,7 +12,7 @@ import numpy as np
 from tussle.errors import TussleError
 from tussle.mission import Block, GivenMission, Mission, mission_of
 from tussle.view.shapes import Mesh
-from tussle.view.solids import MOST_FACES, mesh_of, outline_of
+from tussle.view.solids import MAX_FACES, mesh_of, outline_of
 from tussle.view.terrain import Terrain
 from tussle.world.geodesy import Origin
 from tussle.world.rays.surfaces import MeshPart
@@ -28,7 +28,7 @@ from tussle.world.scene import (
     Volume,
 )
 
-LEAST_EXTENT = 50.0
+MIN_EXTENT = 50.0
 """Least width of the visible box [m]."""
 N_GRID_LINES = 20
 """Approximate number of lines of the default ground grid."""
@@ -174,8 +174,8 @@ def _shapes(mission: Mission, notes: list[str]) -> list[tuple[str, int | None, V
     found += [(str(name), None, shape, False) for name, shape in scene.boundaries.items()]
     for i, mesh in enumerate(scene.meshes, 1):
         found.append((f"mesh {i}", None, mesh, True))
-        if len(mesh.faces) > MOST_FACES:
-            notes.append(f"mesh {i} has {len(mesh.faces):,} triangles; {MOST_FACES:,} of them are shown")
+        if len(mesh.faces) > MAX_FACES:
+            notes.append(f"mesh {i} has {len(mesh.faces):,} triangles; {MAX_FACES:,} of them are shown")
     found += [(f"wall {i + 1}", None, shape, True) for i, shape in enumerate(scene.walls)]
     found += [(p.instance_name, r.team, r.shape, False) for p in mission.interactions for r in p.regions()]
     for plugin in mission.interactions:
@@ -216,11 +216,11 @@ def _corners_of_field(field: HeightField) -> list[np.ndarray]:
 
 
 def _at_least(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """A box around corners (k, 3), at least `LEAST_EXTENT` wide."""
+    """A box around corners (k, 3), at least `MIN_EXTENT` wide."""
     if not len(corners):
         corners = np.zeros((1, 3))
     low, high = corners.min(axis=0), corners.max(axis=0)
-    missing = np.maximum(0.0, np.array([LEAST_EXTENT, LEAST_EXTENT, 0.0]) - (high - low))
+    missing = np.maximum(0.0, np.array([MIN_EXTENT, MIN_EXTENT, 0.0]) - (high - low))
     return low - 0.5 * missing, high + 0.5 * missing
 
 

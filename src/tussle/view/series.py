@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-MOST_CHANGES = 20_000
+MAX_CHANGES = 20_000
 """Changes that are kept of one quantity; of more, every other one of the past goes."""
 
 OF_TEAMS = ("left", "born", "score")
@@ -38,7 +38,7 @@ class StepSeries:
         values: The values; NaN where the quantity is not known, or is no finite number.
         first: First step that was read.
         last: Last step that was read.
-        is_thinned: There were more than `MOST_CHANGES`, so changes of the past are missing.
+        is_thinned: There were more than `MAX_CHANGES`, so changes of the past are missing.
     """
 
     def __init__(self) -> None:
@@ -59,7 +59,7 @@ class StepSeries:
             The series that goes on: this one, or a shorter one in its place.
         """
         value = value if math.isfinite(value) else math.nan
-        series = self.thinned() if len(self.steps) >= MOST_CHANGES else self
+        series = self.thinned() if len(self.steps) >= MAX_CHANGES else self
         if series.first < 0:
             series.first = step
         if is_after_gap and step > series.last + 1 and series.steps:

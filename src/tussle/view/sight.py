@@ -15,7 +15,7 @@ RANGES = (
     "range", "max_range", "max_detect_range", "detection_range", "sensing_range", "comms_range", "sphere_of_influence",
 )  # fmt: skip
 """Parameters that say how far a plugin sees or hears, the first one counts."""
-FARTHEST = 1e6
+MAX_RANGE = 1e6
 """Ranges from here on have no end [m]."""
 _ANGLE = re.compile(r"(?:^|_)(?:fov|field_of_view)(?:_|$)")
 _RISING = re.compile(r"(?:^|_)(?:el|elevation|v|vert|vertical)(?:_|$)")
@@ -52,7 +52,7 @@ def range_of(plugin: Any) -> float | None:
     for name in RANGES:
         value = plugin.values.get(name)
         if isinstance(value, (int, float)) and not isinstance(value, bool) and value > 0.0:
-            return float(value) if value < FARTHEST else math.inf
+            return float(value) if value < MAX_RANGE else math.inf
     return None
 
 

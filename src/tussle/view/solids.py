@@ -9,7 +9,7 @@ import numpy as np
 from tussle.view.shapes import Mesh, ball
 from tussle.world.scene import Convex, FlatGround, Plane, Prism, Sphere, TriangleMesh, Volume
 
-MOST_FACES = 100_000
+MAX_FACES = 100_000
 """Triangles of a mesh that are drawn."""
 N_CIRCLE = 48
 """Lines of each circle that outlines a sphere."""
@@ -24,7 +24,7 @@ def mesh_of(shape: Volume | TriangleMesh, low: np.ndarray, high: np.ndarray) -> 
         high: Upper corner [m], (3,).
     """
     if isinstance(shape, TriangleMesh):
-        return Mesh(shape.vertices, shape.faces[:MOST_FACES])
+        return Mesh(shape.vertices, shape.faces[:MAX_FACES])
     if isinstance(shape, Sphere):
         return ball(3).placed(2.0 * shape.radius, shape.center)
     rings = _rings(shape, low, high)

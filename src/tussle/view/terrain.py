@@ -10,7 +10,7 @@ from tussle.view.shapes import Mesh
 from tussle.world.rays.surfaces import MeshPart
 from tussle.world.scene import HeightField
 
-MOST_DRAWN = 40_000
+MAX_DRAWN = 40_000
 """Largest number of heights that are drawn: 80,000 triangles."""
 
 
@@ -37,14 +37,14 @@ class Terrain:
         x, y = field.west + field.cell * np.arange(nx), field.south + field.cell * np.arange(ny)
         return cls(x, y, field.height, field.texture)
 
-    def thinned(self, most: int = MOST_DRAWN) -> Terrain:
+    def thinned(self, most: int = MAX_DRAWN) -> Terrain:
         """Every k-th column and row, with the least k that leaves at most this number of heights."""
         stride = 1
         while len(self.x[::stride]) * len(self.y[::stride]) > most:
             stride += 1
         return Terrain(self.x[::stride], self.y[::stride], self.height[::stride, ::stride], self.texture)
 
-    def mesh(self, most: int = MOST_DRAWN) -> Mesh:
+    def mesh(self, most: int = MAX_DRAWN) -> Mesh:
         """Two triangles between each four neighbours, of at most this number of heights."""
         thin = self.thinned(most)
         nx, ny = len(thin.x), len(thin.y)
@@ -55,7 +55,7 @@ class Terrain:
         vertices = np.stack([east.ravel(), north.ravel(), thin.height.ravel()], 1)
         return Mesh(vertices, np.concatenate([below, above]))
 
-    def part(self, most: int = MOST_DRAWN) -> MeshPart | None:
+    def part(self, most: int = MAX_DRAWN) -> MeshPart | None:
         """The surface with its image, of at most this number of heights; None without an image."""
         if self.texture is None:
             return None

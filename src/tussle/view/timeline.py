@@ -18,7 +18,7 @@ from tussle.engine.snapshot import Snapshot
 from tussle.engine.state import Parked
 from tussle.engine.table import Stored
 from tussle.errors import SnapshotError
-from tussle.view.frame import Frame, Lens
+from tussle.view.frame import Frame, FrameReader
 from tussle.view.pacing import Allowance
 
 SNAPSHOT_SHARE = 0.01
@@ -130,7 +130,7 @@ class History:
 
     def __init__(self, simulation: Simulation, world: int, limit: float) -> None:
         self._clock = simulation.state.context.clock
-        self._lens = Lens(simulation, world)
+        self._reader = FrameReader(simulation, world)
         self._limit = limit
         self._allowance = Allowance(HISTORY_SHARE)
         self._stride = 1
@@ -143,8 +143,8 @@ class History:
         if (self._entries and step < self._entries[-1][0] + self._stride) or not self._allowance.allows():
             return
         began = time.thread_time()
-        floats, who = self._lens.look()
-        order = slice(None) if self._lens.order is None else self._lens.order
+        floats, who = self._reader.read()
+        order = slice(None) if self._reader.order is None else self._reader.order
         state = np.empty((_N_KEPT, len(who[0])), np.float32)
         with np.errstate(over="ignore"):  # values beyond 3e38 become inf
             state[:_N_STATE] = floats[:_N_STATE, order]

@@ -12,7 +12,7 @@ from tussle.errors import ParameterError
 from tussle.numeric import total
 from tussle.world.shapes import Volume, checked_number
 
-LEAST_CORNERS, MOST_CORNERS = 3, 1000
+MIN_CORNERS, MAX_CORNERS = 3, 1000
 
 
 @dataclass(frozen=True)
@@ -37,9 +37,9 @@ class Prism(Volume):
     def __post_init__(self) -> None:
         corners = tuple((float(x), float(y)) for x, y in self.corners)
         object.__setattr__(self, "corners", corners)
-        if not LEAST_CORNERS <= len(corners) <= MOST_CORNERS:
+        if not MIN_CORNERS <= len(corners) <= MAX_CORNERS:
             raise ParameterError(
-                f"Prism.corners has {len(corners)} corners; it takes {LEAST_CORNERS} to {MOST_CORNERS}"
+                f"Prism.corners has {len(corners)} corners; it takes {MIN_CORNERS} to {MAX_CORNERS}"
             )
         if not all(math.isfinite(value) for corner in corners for value in corner):
             raise ParameterError(f"Prism.corners = {corners!r} is not allowed; it takes finite numbers")

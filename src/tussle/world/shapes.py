@@ -23,7 +23,7 @@ from tussle.numeric import cos, sin, volumes
 Vector = tuple[float, float, float]
 Matrix = tuple[Vector, Vector, Vector]
 IDENTITY: Matrix = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-MOST_POINTS = 32
+MAX_POINTS = 32
 """Maximum number of points of a polyhedron: faces are searched among all triples of points, 4,960 for 32."""
 
 
@@ -110,7 +110,7 @@ class Convex(Volume):
         return way
 
     def outward(self, pos: np.ndarray) -> np.ndarray:
-        """Of the face whose plane is nearest."""
+        """Outward normals of the faces whose planes are nearest."""
         east, north, up, offset = self._face_columns[:, :, None]
         face = (east * pos[0] + north * pos[1] + up * pos[2] - offset).argmax(axis=0)
         return np.asarray(self._face_columns[:3, face])
@@ -247,8 +247,8 @@ class Polyhedron(Convex):
     def __post_init__(self) -> None:
         points = tuple(_as_vector(p, f"Polyhedron.points[{i}]") for i, p in enumerate(self.points))
         object.__setattr__(self, "points", points)
-        if not 4 <= len(points) <= MOST_POINTS:
-            raise ParameterError(f"Polyhedron.points has {len(points)} points; it takes 4 to {MOST_POINTS}")
+        if not 4 <= len(points) <= MAX_POINTS:
+            raise ParameterError(f"Polyhedron.points has {len(points)} points; it takes 4 to {MAX_POINTS}")
         if len(self._faces) < 4:
             raise ParameterError(
                 f"Polyhedron.points = {points!r} is not allowed; all of them lie in one plane"

@@ -48,3 +48,32 @@ def test_a_robot_learns_to_stay_near_the_origin(tmp_path, monkeypatch):
         simulation.step(60)
         near = abs(simulation.read("robot.pos")[0][..., 0]) < 2.5
     assert near.mean() > 0.7
+
+
+def test_settings_come_from_a_file_and_the_command_line(tmp_path, monkeypatch):
+    pytest.importorskip("torch", reason=NEEDS["torch"].reason)
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "ppo.toml").write_text(
+        "worlds = 4\ndecisions = 16\nevaluate_every = 1\nevaluate_episodes = 6\n"
+    )
+    command = (
+        "train",
+        "tussle/PredatorsAndPrey-v0",
+        "--out",
+        "roles",
+        "--settings",
+        "ppo.toml",
+        "--minutes",
+        0.0001,
+    )
+    done = call(*command, "--set", "worlds=2")
+    assert done.returncode == 0, done.stderr
+    assert "evaluated: return" in done.stdout
+    assert "95 % interval" in done.stdout
+    names = {path.name for path in (tmp_path / "roles").iterdir()}
+    assert names >= {"prey.onnx", "keepers.onnx", "switchers.onnx", "evaluations.csv", "curve.png"}
+    assert "resume with the same task and settings" in call(*command, "--resume").stderr
+    assert call(*command, "--set", "worlds=2", "--resume").returncode == 0
+    (tmp_path / "ppo.toml").write_text("world = 4\n")
+    done = call("train", "tussle/RLSimple-v0", "--settings", "ppo.toml")
+    assert "ppo.toml: there is no setting 'world' (did you mean 'worlds'?)" in " ".join(done.stderr.split())

@@ -38,7 +38,7 @@ from tussle.view.recording import Recording
 
 SECONDS = 10
 BYTES = 1 << 30
-MOST_FAULTS = 20
+MAX_FAULTS = 20
 GAME = ("predator_prey", "--set", "prey=6", "--processes", "1")
 VARIED = (
     "--vary",
@@ -312,7 +312,7 @@ def main(sources: Path, work: Path, first: int, last: int) -> None:
     bound_memory()
     n_faults = 0
     for number in range(first, last):
-        if n_faults > MOST_FAULTS:
+        if n_faults > MAX_FAULTS:
             break
         kind = kinds[number % len(kinds)]
         rng = random.Random(number)

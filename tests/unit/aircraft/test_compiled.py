@@ -10,7 +10,7 @@ import pytest
 
 from tussle.aircraft.compile import CompiledAircraft, GeneratedKernel, compile_aircraft
 from tussle.aircraft.initial import place, run_initial
-from tussle.aircraft.node import MOST_NODES, AircraftError, read_text
+from tussle.aircraft.node import MAX_NODES, AircraftError, read_text
 
 DT = 1.0 / 120.0
 START = {
@@ -203,7 +203,7 @@ def test_an_aircraft_without_weight_is_refused(tmp_path):
 def test_hostile_xml_is_refused():
     for text, message in (
         ("<a>" * 100, "nest deeper"),
-        ("<a>" + "<b/>" * (MOST_NODES + 1) + "</a>", "more than"),
+        ("<a>" + "<b/>" * (MAX_NODES + 1) + "</a>", "more than"),
         ("<!DOCTYPE a [<!ENTITY x '1'><!ENTITY y '&x;&x;'>]><a>&y;</a>", "only 100 short texts"),
         ("<!DOCTYPE a [<!ENTITY x SYSTEM 'file:///etc/passwd'>]><a>&x;</a>", "only 100 short texts"),
         ("<a", "it is not XML"),

@@ -514,7 +514,7 @@ class Noise:
 
 @pytest.mark.parametrize("protocol", ["json", "scrimmage"])
 def test_a_flood_ends_the_world_of_its_vehicle_and_no_other(protocol, monkeypatch):
-    monkeypatch.setattr("tussle.plugins.stock.autonomy.ardupilot.links.MOST_PACKETS", 50)
+    monkeypatch.setattr("tussle.plugins.stock.autonomy.ardupilot.links.MAX_PACKETS", 50)
     first = free_ports(4)
     if protocol == "json":
         mission, servant = copter(first, world_step=1, end=1.0), JsonServant(first + 1)

@@ -457,7 +457,7 @@ def test_a_second_px4_finds_nobody_and_the_first_flies_on():
 
 
 def test_a_px4_that_reads_nothing_is_told(monkeypatch):
-    monkeypatch.setattr("tussle.plugins.stock.autonomy.px4.link.MOST_BYTES", 4096)
+    monkeypatch.setattr("tussle.plugins.stock.autonomy.px4.link.MAX_BYTES", 4096)
     port = tcp_port()
     mission = copter(port, lockstep=False, time_warp=1000.0, dt=0.01, end=1e6)
     stop = threading.Event()

@@ -11,7 +11,7 @@ from gambles import game
 
 from tussle.batch import Batch, InProcess, Processes
 
-MOST_GROWTH = 5.0  # [MB]; a leak of half a kilobyte a run would show
+MAX_GROWTH = 5.0  # [MB]; a leak of half a kilobyte a run would show
 
 
 def resident(process="self"):
@@ -36,10 +36,10 @@ def grown(executor, directory, n_runs):
 @pytest.mark.slow
 def test_ten_thousand_runs(tmp_path):
     ours, theirs = grown(Processes(2), tmp_path / "out", 10_000)
-    assert ours < MOST_GROWTH
-    assert theirs < MOST_GROWTH
+    assert ours < MAX_GROWTH
+    assert theirs < MAX_GROWTH
 
 
 @pytest.mark.slow
 def test_ten_thousand_runs_in_memory_take_two_kilobytes_each():
-    assert grown(InProcess(), None, 10_000)[0] < 9 * 2.0 + 2 * MOST_GROWTH
+    assert grown(InProcess(), None, 10_000)[0] < 9 * 2.0 + 2 * MAX_GROWTH

@@ -18,7 +18,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from tussle.batch.executors import InProcess
-from tussle.batch.search.optimization import MOST_TRIALS, Optimization, optimize
+from tussle.batch.search.optimization import MAX_TRIALS, Optimization, optimize
 from tussle.batch.search.study_store import StudyStore, load_study, notes_on_versions
 from tussle.batch.variables import Range
 from tussle.errors import BatchError, MissingExtraError, MissionError, ParameterError
@@ -247,7 +247,7 @@ def test_a_search_with_constraints_goes_on_and_is_another_one_than_without(tmp_p
         ({"runs": 0}, "runs = 0"),
         ({"per_round": 2.5}, "per_round = 2.5"),
         ({"first_seed": True}, "first_seed = True"),
-        ({"trials": MOST_TRIALS + 1}, "trials = 10001"),
+        ({"trials": MAX_TRIALS + 1}, "trials = 10001"),
         ({"vary": {"Bowl.x": [1, "1", "a"]}}, "Bowl.x"),
         ({"objective": "Bowl.hight"}, "did you mean 'Bowl.height'"),
         ({"objective": "Bowl.height["}, "cannot be read"),

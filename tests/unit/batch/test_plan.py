@@ -6,7 +6,7 @@ import pyarrow as pa
 import pytest
 
 from tussle.batch import Batch
-from tussle.batch.plan import MOST_RUNS, BatchPlan
+from tussle.batch.plan import MAX_RUNS, BatchPlan
 from tussle.errors import ParameterError
 from tussle.mission import read_mission
 
@@ -69,7 +69,7 @@ def test_the_last_seeds_of_all_are_there():
         ({"n_seeds": 1, "first_seed": 2**64}, "from 0 to 18446744073709551615"),
         ({"n_seeds": 2, "first_seed": 2**64 - 1}, "begin with a smaller one"),
         ({"n_seeds": 2, "first_seed": 2**64 - 3, "independent": True}, "begin with a smaller one"),
-        ({"n_seeds": MOST_RUNS}, "3 points with 10,000,000 seeds each are 30,000,000 runs"),
+        ({"n_seeds": MAX_RUNS}, "3 points with 10,000,000 seeds each are 30,000,000 runs"),
     ],
 )
 def test_a_plan_that_is_not_allowed_is_refused(options, words):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import strategies as st
 
-from tussle.batch.quantities import LONGEST_TEXT, Quantity
+from tussle.batch.quantities import MAX_TEXT, Quantity
 from tussle.errors import ParameterError
 
 COLUMNS = {
@@ -76,9 +76,9 @@ def test_what_is_no_arithmetic_is_refused(text):
 
 
 def test_long_and_deep_texts_are_refused_or_read():
-    assert Quantity.parse("-" * (LONGEST_TEXT - 1) + "t").evaluate(COLUMNS)[0] == -10.0
-    with pytest.raises(ParameterError, match=f"at most {LONGEST_TEXT}"):
-        Quantity.parse("t" * (LONGEST_TEXT + 1))
+    assert Quantity.parse("-" * (MAX_TEXT - 1) + "t").evaluate(COLUMNS)[0] == -10.0
+    with pytest.raises(ParameterError, match=f"at most {MAX_TEXT}"):
+        Quantity.parse("t" * (MAX_TEXT + 1))
 
 
 def test_shares_are_told_from_other_numbers():

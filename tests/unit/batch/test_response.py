@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from made_batches import made_batch
 
-from tussle.batch.response import FEWEST_POINTS, fitted, point_means
+from tussle.batch.response import MIN_POINTS, fitted, point_means
 from tussle.batch.results import Results
 from tussle.batch.sampling import sample
 from tussle.batch.variables import Choice, Range
@@ -121,7 +121,7 @@ def test_values_of_batches_are_fitted():
 
 def test_what_cannot_be_fitted_is_told():
     points = sample([UAV], "lhs", 3, 0)
-    with pytest.raises(ParameterError, match=f"3 points have runs, and a fit takes {FEWEST_POINTS}"):
+    with pytest.raises(ParameterError, match=f"3 points have runs, and a fit takes {MIN_POINTS}"):
         fitted([UAV], points, np.ones((2, 3)))
     with pytest.raises(ParameterError, match="nothing that varies"):
         fitted([], [{}], np.ones((9, 1)))

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tussle.batch.statistics import wilson
-from tussle.batch.until import FEWEST_RUNS, Until
+from tussle.batch.until import MIN_RUNS, Until
 from tussle.errors import ParameterError
 
 
@@ -80,10 +80,10 @@ def test_a_mean_is_as_wide_as_its_normal_interval():
 
 def test_a_few_runs_are_never_enough():
     rule = Until.parse("score[1]:1")
-    equal = {"score[1]": np.full(FEWEST_RUNS - 1, 3.0), "wins[1]": np.full(FEWEST_RUNS - 1, 1.0)}
+    equal = {"score[1]": np.full(MIN_RUNS - 1, 3.0), "wins[1]": np.full(MIN_RUNS - 1, 1.0)}
     assert rule.width(equal) == math.inf
     assert Until.parse("0.4").width(equal) == math.inf
-    assert rule.is_met([{"score[1]": np.full(FEWEST_RUNS, 3.0)}])
+    assert rule.is_met([{"score[1]": np.full(MIN_RUNS, 3.0)}])
 
 
 def test_a_result_that_the_runs_do_not_have_is_told():

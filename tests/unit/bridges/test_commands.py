@@ -111,7 +111,7 @@ def test_it_is_no_error_that_an_entity_is_gone(game, send):
 
 
 def test_more_commands_than_a_step_takes_are_refused(game, send, monkeypatch):
-    monkeypatch.setattr("tussle.plugins.stock.interaction.grpc_command_string.MOST_WAITING", 2)
+    monkeypatch.setattr("tussle.plugins.stock.interaction.grpc_command_string.MAX_WAITING", 2)
     with Simulation(game):
         answers = send(*[("GlobalNetwork", "Event", "go")] * 3)
     assert answers == ["1", "1", "RESOURCE_EXHAUSTED 2 commands wait for the next step"]

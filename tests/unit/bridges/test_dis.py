@@ -558,7 +558,7 @@ def test_a_port_that_is_taken_is_named_and_one_that_is_left_is_free():
 
 def test_the_clock_is_waited_for(monkeypatch):
     waits = []
-    monkeypatch.setattr("tussle.plugins.stock.interaction.dis.link.time.sleep", waits.append)
+    monkeypatch.setattr("tussle.pacing.time.sleep", waits.append)
     with Simulation(mission(time_warp=1.0)) as sim:
         sim.step(5)
     assert waits

@@ -17,7 +17,7 @@ from tussle.stock import Boids, Still, Unicycle, manifest
 
 N_GAMES = int(os.environ.get("TUSSLE_MEMORY_GAMES", "120"))
 """Games per model; the promise is about two thousand, which takes minutes."""
-MOST_GROWTH = (
+MAX_GROWTH = (
     1.0 + 0.002 * N_GAMES
 )  # [MB]; allocators settle for some thousand games. What was kept took 20 kB a game and more
 SHIPPED = [
@@ -43,7 +43,7 @@ def test_games_leave_no_memory_behind():
     assert run.returncode == 0, run.stderr
     grown = {model: float(by) for model, by in (line.rsplit(" ", 1) for line in run.stdout.splitlines())}
     assert list(grown) == MODELS
-    assert {model: by for model, by in grown.items() if by >= MOST_GROWTH} == {}
+    assert {model: by for model, by in grown.items() if by >= MAX_GROWTH} == {}
 
 
 def test_radii_that_change_at_each_reset_keep_no_index_each():

@@ -57,7 +57,7 @@ def test_bytes_of_no_sense_are_refused_and_nothing_else_happens(messages, change
     [
         (8, 0, 0),
         (-1, 0, 0),
-        (wire.MOST_BYTES + 1, 0, 0),
+        (wire.MAX_BYTES + 1, 0, 0),
         (9, 1, 0),
         (9, -1, 0),
         (9, 0, 1),

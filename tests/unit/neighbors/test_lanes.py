@@ -14,11 +14,14 @@ from tussle.numeric.neighbors.lanes import (
     bits,
     choose,
     inverse_sqrt,
+    load,
     load_some,
     lowest,
     ones,
+    pack,
     splat,
     store_some,
+    unlike,
 )
 
 
@@ -114,3 +117,18 @@ def test_operations_on_lanes_are_found_before_those_on_anything_else(monkeypatch
     monkeypatch.setattr(_OverloadFunctionTemplate, "generic", asked)
     assert find(operator.add, (LANES_TYPE, float64), {}).return_type == LANES_TYPE
     assert find(operator.lt, (LANES_TYPE, LANES_TYPE), {}).return_type == MASK_TYPE
+
+
+@kernel("I i8 i8 Iw -> i8")
+def packed(wholes, start, whole, found):
+    return pack(found, 1, start, bits(unlike(load(wholes, 0), whole)))
+
+
+def test_places_are_packed_in_order_for_every_mask():
+    for mask in range(256):
+        wholes = np.array([9 if mask >> k & 1 else 4 for k in range(LANES)])
+        found, plain = np.zeros(2 * LANES, np.int64), np.zeros(2 * LANES, np.int64)
+        n = packed(wholes, 100, 4, found)
+        assert found[1:n].tolist() == [100 + k for k in range(LANES) if mask >> k & 1]
+        assert pack.py_func(plain, 1, 100, mask) == n
+        assert plain[1:n].tolist() == found[1:n].tolist()

@@ -18,7 +18,7 @@ import pytest
 
 from tussle.numeric import processor, store
 from tussle.numeric.fingerprint import Fingerprint
-from tussle.numeric.kernel import built, device, kernel, routine, stats
+from tussle.numeric.kernel import built, device, kernel, lean_routine, stats
 
 GAIN = 2.0
 
@@ -171,7 +171,7 @@ def test_functions_that_a_kernel_calls_may_print_raise_and_call_themselves(own_c
             print("large", x)
         return 2.0 * x
 
-    @routine
+    @lean_routine
     def doubled(x, times):
         return told(x) if times == 1 else doubled(told(x), times - 1)
 

@@ -16,7 +16,7 @@ import pytest
 from numpy._core._multiarray_umath import __cpu_dispatch__, __cpu_features__
 
 import tussle
-from tussle.numeric import store
+from tussle.numeric import processor, store
 from tussle.numeric.kernel import Kernel, kernel
 from tussle.numeric.neighbors.walk import make_walk
 from tussle.numeric.rk4 import driver
@@ -35,6 +35,9 @@ SETTINGS = {
     "x86-64-v3": {"NUMBA_CPU_NAME": "x86-64-v3", "NUMBA_CPU_FEATURES": ""},
     "unoptimised": {"NUMBA_OPT": "0"},
 }
+for wide, features in processor.WIDE.items():
+    if processor.level() == wide:
+        SETTINGS[wide] = {"NUMBA_CPU_NAME": wide, "NUMBA_CPU_FEATURES": features}
 HASH = "6253fd21ad5e16a14a2ea4ee17c8ac88"
 """What PROGRAM prints; another one is a change of numbers, which the changelog tells."""
 

@@ -313,8 +313,8 @@ def test_tags_of_the_scene(folder, monkeypatch):
     (folder / "back.xml").write_text(to_xml(loaded.mission))
     again = read_mission(folder / "back.xml").mission
     assert (again.scene, again.blocks) == (scene, loaded.mission.blocks)
-    monkeypatch.setattr("tussle.view.scenery.MOST_FACES", 5)
-    monkeypatch.setattr("tussle.view.solids.MOST_FACES", 5)
+    monkeypatch.setattr("tussle.view.scenery.MAX_FACES", 5)
+    monkeypatch.setattr("tussle.view.solids.MAX_FACES", 5)
     shown = scenery_of(loaded.mission)
     assert [(region.name, len(region.mesh.faces)) for region in shown.boundaries] == [
         ("mesh 1", 5),

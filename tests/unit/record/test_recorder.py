@@ -12,6 +12,7 @@ import tussle
 from tussle import Block, Mission, Recorder, Simulation, load_run
 from tussle.api import Autonomy, Interaction, Output
 from tussle.errors import ParameterError, RecordError
+from tussle.mission.write import with_seed
 from tussle.record.events import Events
 from tussle.stock import GroundCollision, SingleIntegrator, Still
 
@@ -333,3 +334,18 @@ def test_names_are_loaded_when_asked_for():
         _ = tussle.recorder_
     with pytest.raises(AttributeError, match="no attribute 'recorder_'"):
         _ = tussle.record.recorder_
+
+
+@pytest.mark.parametrize(
+    ("text", "seed", "wanted"),
+    [
+        ("<runscript><seed>7</seed><run/></runscript>", 9, "<runscript><seed>9</seed><run/></runscript>"),
+        ('<runscript>\n <seed time="3" >7</seed ></runscript>', 9, '<runscript>\n <seed time="3" >9</seed></runscript>'),
+        ("<runscript><seed/></runscript>", 9, "<runscript><seed>9</seed></runscript>"),
+        ("<!-- <seed>1</seed> --><runscript><seed>7</seed></runscript>", 9, "<!-- <seed>1</seed> --><runscript><seed>9</seed></runscript>"),
+        ('<runscript name="a"><run/></runscript>', 9, '<runscript name="a">\n  <seed>9</seed><run/></runscript>'),
+        ("<runscript><seeds>7</seeds></runscript>", 1, "<runscript><seeds>7</seeds></runscript>"),
+    ],
+)  # fmt: skip
+def test_the_mission_of_a_run_has_the_seed_that_was_played(text, seed, wanted):
+    assert with_seed(text, seed) == wanted

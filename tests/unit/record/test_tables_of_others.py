@@ -213,7 +213,7 @@ def test_a_parquet_file_that_is_damaged_anywhere_is_read_or_refused(tmp_path):
 
 def test_a_csv_that_is_a_bomb_is_refused(tmp_path, monkeypatch):
     monkeypatch.setattr("tussle.record.first_states.MARGIN", 1 << 16)
-    monkeypatch.setattr("tussle.record.first_states.MOST_EXPANSION", 10)
+    monkeypatch.setattr("tussle.record.first_states.MAX_EXPANSION", 10)
     with pa.output_stream(str(tmp_path / "a.csv.gz"), compression="gzip") as file:
         file.write(b"id,t\n" + b"\n" * 10_000_000)
     with pytest.raises(RecordError, match=r"a.csv.gz: cannot be read: its decompressed size exceeds"):

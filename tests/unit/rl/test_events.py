@@ -179,14 +179,14 @@ def views(task, seed):
 
     def one(action):
         *_, dead, late, info = env.step(action)
-        return dead or late, info["own"]
+        return dead or late, info["terms"]["own"]
 
     many = make_vec(task, 2, autoreset="disabled")
     many.reset(seed=[seed, seed + 1])
 
     def vector(action):
         *_, dead, late, info = many.step(np.stack([action, action]))
-        return (dead | late)[0], info["own"][0]
+        return (dead | late)[0], info["terms"]["own"][0]
 
     agents = parallel_env(task)
     agents.reset(seed=seed)

@@ -7,12 +7,13 @@ from dataclasses import replace
 import gymnasium
 import numpy as np
 import pytest
+from flee import Flee
 from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AutoresetMode
 from pettingzoo.utils import parallel_to_aec
 
 from tussle.errors import ParameterError
-from tussle.rl import TaskParallelEnv, make, make_vec, parallel_env
+from tussle.rl import TaskParallelEnv, Term, alive, make, make_vec, parallel_env
 
 
 @pytest.mark.parametrize("which", ["task", "solo"])
@@ -198,3 +199,34 @@ def test_an_episode_may_begin_without_agents(task):
     while env.agents or not env.swarm.over[0]:
         env.step({a: np.zeros(2, np.float32) for a in env.agents})
     assert env.step({}) == ({}, {}, {}, {}, {})
+
+
+@pytest.mark.parametrize("name", ["alive", "seed", "params", "terms", "episode", "final_obs"])
+def test_a_term_may_have_any_name(name):
+    """Infos tell the same, whatever the terms of the reward are called."""
+
+    def infos(term):
+        task = Flee(reward={term: Term(alive, 0.5)}, vary=["prey.Unicycle.vel_max=10:20"], time_limit=0.3)
+        env, envs = make(task), make_vec(task, 2, autoreset="same_step")
+        action = np.zeros((6, 2), np.float32)
+        found = [env.reset(seed=1)[1], envs.reset(seed=1)[1]]
+        for _ in range(3):
+            found += [env.step(action)[4], envs.step(np.stack([action, action]))[4]]
+        return found
+
+    def told(info):
+        info = {key: value for key, value in info.items() if key not in ("terms", "final_info")}
+        return {key: repr(value) for key, value in info.items()}
+
+    mine, others = infos(name), infos("plain")
+    assert [told(info) for info in mine] == [told(info) for info in others]
+    assert mine[2]["terms"] == {name: 3.0}
+    assert mine[3]["terms"][name].tolist() == [3.0, 3.0]
+    last = mine[-1]["final_info"]
+    assert told(last) == told(others[-1]["final_info"])
+    assert last["terms"][name].tolist() == [3.0, 3.0]
+
+
+def test_masks_of_infos_are_not_the_names_of_terms():
+    with pytest.raises(ParameterError, match=r"reward '_alive'.*does not begin with _"):
+        Flee(reward={"alive": Term(alive), "_alive": Term(alive)})

@@ -8,7 +8,17 @@ import numpy as np
 import pytest
 from needs import NEEDS
 
-from tussle.rl import NearOrigin, ReachPoint, evaluate, make, make_vec, parallel_env
+from tussle.rl import (
+    NearOrigin,
+    PredatorsAndPrey,
+    ReachPoint,
+    SimpleTag,
+    evaluate,
+    make,
+    make_swarm,
+    make_vec,
+    parallel_env,
+)
 
 torch = pytest.importorskip("torch", reason=NEEDS["torch"].reason)
 
@@ -156,3 +166,53 @@ def test_a_script_in_the_way_of_cleanrl_learns_on_make_vec():
     envs.close()
     first, last = np.mean(returns_of_episodes[:n_worlds]), np.mean(returns_of_episodes[-n_worlds:])
     assert last > first + 0.3
+
+
+def test_torchrl_takes_agents_groups_and_dead_agents():
+    """Its wrappers check our specifications; groups are the roles of a task."""
+    environments = pytest.importorskip("torchrl.envs", reason="TorchRL is not installed")
+    from torchrl.envs.utils import check_env_specs
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of TorchRL itself
+        check_env_specs(environments.GymWrapper(make(ReachPoint)))
+        check_env_specs(environments.PettingZooWrapper(parallel_env(SimpleTag())))
+        task = PredatorsAndPrey(time_limit=5.0)
+        groups = {role: [a for a in task.agent_names if task.policy_of(a) == role] for role in task.roles}
+        env = environments.PettingZooWrapper(parallel_env(task), use_mask=True, group_map=groups)
+        rollout = env.rollout(5)
+    assert rollout["prey", "observation"].shape == (5, 100, 46)
+    assert rollout["keepers", "observation"].shape == (5, 5, 32)
+
+
+def test_rllib_takes_agents_and_the_mapping_of_their_policies():
+    """Its wrapper of PettingZoo; its own runs need a cluster of Ray."""
+    wrappers = pytest.importorskip("ray.rllib.env.wrappers.pettingzoo_env", reason="RLlib is not installed")
+    task = PredatorsAndPrey(time_limit=2.0)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of RLlib itself
+        env = wrappers.ParallelPettingZooEnv(parallel_env(task))
+    obs, _ = env.reset(seed=1)
+    n_steps, ended = 0, {"__all__": False}
+    while not ended["__all__"]:
+        assert {task.policy_of(agent) for agent in obs} == set(task.roles)
+        actions = {agent: env.get_action_space(agent).sample() for agent in obs}
+        obs, rewards, terminated, truncated, _ = env.step(actions)
+        ended = {name: terminated[name] or truncated[name] for name in ("__all__",)}
+        assert rewards.keys() == actions.keys()
+        n_steps += 1
+    assert n_steps == task.n_steps // task.decide_every
+
+
+def test_arrays_keep_their_place_as_vectorised_trainers_expect():
+    """PufferLib's environments write agents of all worlds, one after another, to buffers that stay: those of a swarm do."""
+    swarm = make_swarm(SimpleTag(time_limit=0.5), 8)
+    swarm.reset(seed=1)
+    buffers = [swarm.obs, swarm.rewards, swarm.terminations, swarm.truncations]
+    flat = [each.reshape(32, -1) for each in buffers]
+    for _ in range(12):
+        results = swarm.step(np.ones((8, 4), int))
+        for buffer, rows, result in zip(buffers, flat, results, strict=False):
+            assert result is buffer
+            assert np.shares_memory(rows, result)
+            np.testing.assert_array_equal(rows, result.reshape(32, -1))

@@ -248,7 +248,7 @@ def test_links_are_counted_by_sender_receiver_and_outcome(tmp_path, monkeypatch)
         }
     assert set(links.network) == {"RadioNetwork"}
     assert run.is_complete
-    monkeypatch.setattr("tussle.record.traffic.MOST_LINKS", 5)
+    monkeypatch.setattr("tussle.record.traffic.MAX_LINKS", 5)
     again, _ = recorded(tmp_path / "often", networks, *blocks, seeds=(1, 2))
     assert again.links_table.equals(run.links_table)
 

@@ -25,7 +25,7 @@ from tussle.view.page.chunks import (
     rounded_positions,
     step_of,
 )
-from tussle.view.page.packing import MOST, column, ints, reals
+from tussle.view.page.packing import MAX_VALUE, column, ints, reals
 
 
 def frame(t, entities):
@@ -85,7 +85,7 @@ def test_whole_numbers_come_back(values):
     assert len(data) <= 1 + 4 * len(values)
 
 
-@given(st.lists(st.lists(st.integers(-MOST, MOST), min_size=1, max_size=8), min_size=1, max_size=6))
+@given(st.lists(st.lists(st.integers(-MAX_VALUE, MAX_VALUE), min_size=1, max_size=8), min_size=1, max_size=6))
 def test_series_come_back(series):
     values = np.concatenate([np.array(s) for s in series])
     counts = [len(s) for s in series]
@@ -139,7 +139,7 @@ def test_a_frame_comes_back_and_who_is_nowhere_is_left_out():
 
 def test_a_game_that_is_wider_than_numbers_are_long_has_longer_steps():
     chunk = read_chunk(pack(0, [frame(0.0, {1: (1, -1e9), 2: (1, 1e9)})], 0.002))
-    assert chunk.step == pytest.approx(2e9 / MOST)
+    assert chunk.step == pytest.approx(2e9 / MAX_VALUE)
     assert chunk.frames[0][2].pos[0] == pytest.approx(1e9, abs=10.0)
 
 
@@ -153,13 +153,13 @@ def test_a_game_that_is_wider_than_numbers_are_long_has_longer_steps():
         (10.0, 1.0, 2e-4),
         (0.0, 1.0, 0.002),
         (2000.0, 0.002, 1e-4),
-        (4e6, 1.0, 4e6 / MOST),
+        (4e6, 1.0, 4e6 / MAX_VALUE),
     ],
 )
 def test_positions_are_as_fine_as_the_game_and_its_bodies_are_small(size, smallest, step):
     found = step_of(np.zeros(3), np.array([size, 0.0, 0.0]), smallest)
     assert found == pytest.approx(step)
-    assert size / found <= MOST
+    assert size / found <= MAX_VALUE
 
 
 def test_positions_are_off_by_no_more_than_is_said():

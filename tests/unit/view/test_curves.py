@@ -214,7 +214,7 @@ def test_results_that_take_long_are_read_less_often_and_this_is_said(monkeypatch
 
 
 def test_the_memory_of_a_curve_is_bounded_and_what_is_missing_is_said(monkeypatch):
-    monkeypatch.setattr(series_module, "MOST_CHANGES", 50)
+    monkeypatch.setattr(series_module, "MAX_CHANGES", 50)
     with live_of(guarded_gate()) as live:
         live.step(200)
         gone = live.curves.series["Share.gone", None, 0]

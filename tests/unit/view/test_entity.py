@@ -128,11 +128,11 @@ def test_messages_that_were_heard_and_said():
                                     sim.state.population.bodies.id[at],
                                 ) == (1, who):
                                     expected.append((int(batch.sender[i]), tuple(batch.pos[:, i])))
-            assert sorted((m.sender, tuple(m.fields["pos"])) for m in state.heard) == sorted(expected)
+            assert sorted((m.sender, tuple(m.fields["pos"])) for m in state.received) == sorted(expected)
             heard += len(expected)
-            for letter in state.said:
-                assert letter.topic == "SphereNetwork/Waypoint"
-                assert letter.sender == who
+            for message in state.sent:
+                assert message.topic == "SphereNetwork/Waypoint"
+                assert message.sender == who
                 said += 1
     assert heard > 20
     assert said > 20
@@ -142,9 +142,9 @@ def test_what_the_world_says_is_heard_by_all():
     sim = Simulation(clickable(), seeds=[1, 2])
     sim.publish(WorldPointClicked, [1], pos=(1.0, 2.0, 3.0))
     sim.step()
-    assert entity_state(sim, 0, 1).heard == []
-    (letter,) = entity_state(sim, 1, 1).heard
-    assert (letter.topic, letter.sender) == ("GlobalNetwork/WorldPointClicked", 0)
-    assert letter.fields["pos"].tolist() == [1.0, 2.0, 3.0]
+    assert entity_state(sim, 0, 1).received == []
+    (message,) = entity_state(sim, 1, 1).received
+    assert (message.topic, message.sender) == ("GlobalNetwork/WorldPointClicked", 0)
+    assert message.fields["pos"].tolist() == [1.0, 2.0, 3.0]
     sim.step()
-    assert entity_state(sim, 1, 1).heard == []
+    assert entity_state(sim, 1, 1).received == []

@@ -7,7 +7,7 @@ from recorded_games import hunt
 
 from tussle import Simulation
 from tussle.view import frame_of
-from tussle.view.frame import Lens
+from tussle.view.frame import FrameReader
 
 
 def columns_of(sim, world):
@@ -44,31 +44,31 @@ def test_a_frame_holds_the_states_of_its_world_by_id(name):
 
 def test_a_frame_does_not_change_when_the_game_goes_on_and_cannot_be_changed():
     sim = Simulation(hunt())
-    lens = Lens(sim)
+    reader = FrameReader(sim)
     sim.step(3)
-    frame = lens.frame()
+    frame = reader.frame()
     kept = frame.pos.copy()
     sim.step(10)
     np.testing.assert_array_equal(frame.pos, kept)
-    assert (lens.frame().pos[: len(kept)] != kept).any()
+    assert (reader.frame().pos[: len(kept)] != kept).any()
     with pytest.raises(ValueError, match="read-only"):
         frame.pos[0, 0] = 1.0
 
 
 def test_a_lens_sees_who_has_come_and_gone_and_the_end_of_a_world():
     sim = Simulation(hunt(n_prey=3, end=30.0), seeds=[1, 3])
-    lenses = [Lens(sim, world) for world in range(2)]
+    readers = [FrameReader(sim, world) for world in range(2)]
     counts = set()
     while not sim.is_over:
         sim.step()
-        for world, lens in enumerate(lenses):
-            frame = lens.frame()
+        for world, reader in enumerate(readers):
+            frame = reader.frame()
             counts.add(len(frame))
             np.testing.assert_array_equal(frame.id, frame_of(sim, world).id)
             assert len(frame) == sum(sim.result()[world].alive.values())
     assert len(counts) > 3
     assert sim.steps[0] != sim.steps[1]
-    assert [lens.frame().step for lens in lenses] == sim.steps.tolist()
+    assert [reader.frame().step for reader in readers] == sim.steps.tolist()
 
 
 def test_row_of_an_id():

@@ -15,7 +15,7 @@ from tussle.world.shapes import FlatGround
 SOURCES = {**{name: path for name, (path, _) in shipped_missions().items()}, **stock.examples()}
 SECONDS, MOST = 30.0, 20
 """Simulated time, and entities of a block."""
-LEAST_RADIUS = 0.5
+MIN_RADIUS = 0.5
 """An entity on the ground may lie half in it [m]."""
 
 
@@ -47,4 +47,4 @@ def test_nobody_sinks_below_the_ground(name):
             simulation.step(10)
             bodies = simulation.state.population.bodies
             height = bodies.pos[2] - ground.height(*bodies.pos[:2])
-            assert (height >= -np.maximum(bodies.radius, LEAST_RADIUS)).all()
+            assert (height >= -np.maximum(bodies.radius, MIN_RADIUS)).all()

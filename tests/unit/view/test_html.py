@@ -108,7 +108,7 @@ def test_times_that_are_a_whole_number_of_periods_are_kept_in_spite_of_rounding(
 
 @pytest.mark.parametrize("period", [0.0, -1.0, math.nan, math.inf])
 def test_a_period_is_a_number_of_seconds(hunted, tmp_path, period):
-    with pytest.raises(ParameterError, match="seconds > 0"):
+    with pytest.raises(ParameterError, match="a number > 0"):
         write_html(Recording(hunted), tmp_path / "page.html", period=period)
 
 
@@ -297,7 +297,7 @@ def test_bases_boundaries_and_looks_are_those_of_the_mission(harbour, tmp_path):
 
 @pytest.mark.parametrize("n", [7, 70])
 def test_the_terrain_is_what_it_was(harbour, tmp_path, monkeypatch, n):
-    monkeypatch.setattr("tussle.view.page.document.MOST_HEIGHTS", 300)
+    monkeypatch.setattr("tussle.view.page.document.MAX_HEIGHTS", 300)
     x, y = np.linspace(-100, 100, n), np.linspace(-50, 50, 5)
     hills = Terrain(x, y, 10.0 * np.sin(x / 20.0) + y[:, None] / 7.0)
     harbour.__dict__["scenery"] = replace(harbour.scenery, terrain=hills)

@@ -2,10 +2,12 @@
 
 import pytest
 
+from tussle import pacing as paces
 from tussle.errors import ParameterError
+from tussle.pacing import MAX_LAG, Pace
 from tussle.view import latest, pacing
 from tussle.view.latest import LINGER, LatestValue
-from tussle.view.pacing import Allowance, Pace, Speedometer, checked_warp, faster, slower
+from tussle.view.pacing import Allowance, Speedometer, checked_warp, faster, slower
 
 
 class Clock:
@@ -17,11 +19,15 @@ class Clock:
 
     monotonic = thread_time = perf_counter
 
+    def sleep(self, seconds):
+        self.now += seconds
+
 
 @pytest.fixture
 def clock(monkeypatch):
     clock = Clock()
     monkeypatch.setattr(pacing, "time", clock)
+    monkeypatch.setattr(paces, "time", clock)
     monkeypatch.setattr(latest, "time", clock)
     return clock
 
@@ -44,6 +50,32 @@ def play(pace, clock, seconds, cost=0.001):
 )
 def test_steps_are_made_when_they_are_due(clock, warp, cost, steps):
     assert play(Pace(warp), clock, 10.0, cost) == pytest.approx(steps, abs=2)
+
+
+def test_a_paced_loop_is_neither_early_nor_hurries_after_a_long_stop(clock):
+    pace, began = Pace(2.0), clock.now
+    for step in range(1, 101):
+        pace.hold(0.1 * step, 0.1, lambda: False)
+    assert clock.now - began == pytest.approx(99 * 0.05)
+    clock.now += 60.0  # the machine slept
+    stopped = clock.now
+    for step in range(101, 201):
+        pace.hold(0.1 * step, 0.1, lambda: False)
+    assert 5.0 - MAX_LAG - 0.1 <= clock.now - stopped <= 5.0
+
+
+def test_a_jump_of_simulated_time_is_not_waited_for(clock):
+    pace, began = Pace(1.0), clock.now
+    for t in (0.1, 0.2, 500.0, 500.1, 3.0, 3.1):
+        pace.hold(t, 0.1, lambda: False)
+    assert clock.now - began == pytest.approx(0.3)
+
+
+def test_an_interruption_ends_the_wait(clock):
+    pace, began = Pace(0.001), clock.now
+    pace.hold(1.0, 1.0, lambda: False)
+    pace.hold(2.0, 1.0, lambda: clock.now - began > 1.0)
+    assert clock.now - began == pytest.approx(1.0, abs=0.1)
 
 
 def test_a_game_that_is_late_makes_up_for_little_only(clock):

@@ -13,8 +13,8 @@ from recorded_games import hunt
 from tussle import Recorder, Simulation
 from tussle.errors import MissingExtraError, ViewError
 from tussle.view import Live, Recording
-from tussle.view.page.access import MOST_BROWSERS
-from tussle.view.page.publisher import MOST_MESSAGES
+from tussle.view.page.access import MAX_BROWSERS
+from tussle.view.page.publisher import MAX_MESSAGES
 from tussle.view.page.server import Page
 
 UPGRADE = (
@@ -197,7 +197,7 @@ def test_nothing_is_uploaded(page):
 
 def test_so_many_browsers_and_no_more(live):
     with Page(live) as page:
-        clients = [PageClient(page.url, is_reading=False) for _ in range(MOST_BROWSERS)]
+        clients = [PageClient(page.url, is_reading=False) for _ in range(MAX_BROWSERS)]
         try:
             assert status(page, is_socket=True) == 403
             assert status(page) == 200
@@ -229,7 +229,7 @@ def test_a_message_that_is_too_long_ends_its_connection_and_no_other(live, clien
 
 def test_one_browser_that_sends_without_end_is_slowed_down(live, client):
     began = time.monotonic()
-    for i in range(3 * MOST_MESSAGES):
+    for i in range(3 * MAX_MESSAGES):
         client.order("warp", value=1 + i % 2)
     client.order("warp", value=5)
     client.wait(lambda: live.warp == 5.0)

@@ -147,8 +147,8 @@ def test_an_entity_is_told_with_its_plugins_and_messages():
     assert formatting.entity_sections(state) == [
         ("", [("pos", "0  0  0\N{NO-BREAK SPACE}m")]),
         ("Mine", [("goal", "2\N{NO-BREAK SPACE}m")]),
-        ("heard", [("Net/Topic", "world: x 1")]),
-        ("said", [("Net/Topic", "2: ")]),
+        ("received", [("Net/Topic", "world: x 1")]),
+        ("sent", [("Net/Topic", "2: ")]),
     ]
 
 

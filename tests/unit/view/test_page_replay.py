@@ -173,7 +173,7 @@ def test_a_run_that_stays_in_its_file_is_the_same_run(runs):
 def test_a_wrong_value_of_a_run_that_stays_in_its_file_is_told_when_it_is_seen(
     tmp_path, monkeypatch, name, value, told
 ):
-    monkeypatch.setattr("tussle.view.recording.MOST_SAMPLED", 2)
+    monkeypatch.setattr("tussle.view.recording.MAX_SAMPLED", 2)
     directory = recorded(tmp_path / "run")
     path = directory / "trajectory.arrow"
     batches = list(pa.ipc.open_stream(path.read_bytes()))

@@ -217,7 +217,7 @@ def test_a_part_that_cannot_be_made_is_told_and_the_others_are_sent(fragile, mon
 
 
 def test_what_is_told_has_an_end(fragile, monkeypatch):
-    from tussle.view.page.failures import MOST_FAILURES
+    from tussle.view.page.failures import MAX_FAILURES
 
     _, page, client = fragile
     numbers = iter(range(1000))
@@ -226,9 +226,9 @@ def test_what_is_told_has_an_end(fragile, monkeypatch):
         raise RuntimeError(f"number {next(numbers)} {'x' * 9000}")
 
     monkeypatch.setattr(page.publisher, "_make_drawing", fail_anew)
-    client.wait(lambda: len(page.errors) > MOST_FAILURES)
+    client.wait(lambda: len(page.errors) > MAX_FAILURES)
     time.sleep(0.3)
-    assert len(page.errors) == MOST_FAILURES + 1
+    assert len(page.errors) == MAX_FAILURES + 1
     assert page.errors[-1] == "further errors of the page are not listed"
     assert max(map(len, page.errors)) < 500
 

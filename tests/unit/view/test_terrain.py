@@ -6,7 +6,7 @@ import pytest
 from tussle import Recorder, Simulation
 from tussle.mission import read_mission
 from tussle.view import Live, Recording
-from tussle.view.terrain import MOST_DRAWN, Terrain
+from tussle.view.terrain import MAX_DRAWN, Terrain
 from tussle.world.rays.files import read_surface
 
 GRID = """ncols 3
@@ -54,7 +54,7 @@ def test_large_ones_are_drawn_coarsely():
     x = np.arange(1000.0)
     terrain = Terrain(x, x, x[:, None] + x)
     thin = terrain.thinned()
-    assert 0.5 * MOST_DRAWN < thin.height.size <= MOST_DRAWN
+    assert 0.5 * MAX_DRAWN < thin.height.size <= MAX_DRAWN
     np.testing.assert_array_equal(thin.height, thin.y[:, None] + thin.x)
     assert len(terrain.mesh().vertices) == thin.height.size
     assert terrain.thinned(10**6) is not None

@@ -28,7 +28,7 @@ from tussle.view.export.mcap_file import write_mcap
 from tussle.view.frame import empty_frame
 from tussle.view.page.document import scenery_blobs
 from tussle.world.rays.files import read_surface
-from tussle.world.rays.textures import MOST_SIDE, decoded
+from tussle.world.rays.textures import MAX_SIDE, decoded
 
 MISSION = """<runscript name="hilly"><run dt="0.1" end="0.2"/><terrain {}>hills.asc</terrain>
 <entity><team_id>1</team_id><motion_model>Still</motion_model></entity></runscript>
@@ -182,8 +182,8 @@ def test_an_image_with_too_many_pixels_is_refused_before_it_is_decoded(side, mes
 
 
 def test_large_images_are_made_smaller():
-    shape = decoded("a.png", png(np.zeros((10, MOST_SIDE + 100, 3), np.uint8))).shape
-    assert shape[1] == MOST_SIDE
+    shape = decoded("a.png", png(np.zeros((10, MAX_SIDE + 100, 3), np.uint8))).shape
+    assert shape[1] == MAX_SIDE
 
 
 SQUARE = "mtllib a.mtl\nv 0 0 0\nv 40 0 0\nv 40 40 0\nv 0 40 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nusemtl m\nf 1/1 2/2 3/3 4/4\n"

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from tussle.aircraft.code import Code, normal
 from tussle.aircraft.functions import emit_function
 from tussle.aircraft.node import Element
+from tussle.errors import clipped
 
 
 @dataclass
@@ -75,7 +76,7 @@ class Bench:
         for each in node.find_all("function"):
             given_kind = each.get("type") or "pre"
             if given_kind not in ("pre", "post"):
-                raise each.error(f"type {given_kind[:40]!r} is not supported; there are: pre, post")
+                raise each.error(f"type {clipped(given_kind)!r} is not supported; there are: pre, post")
             if given_kind == kind:
                 emit_function(self.code, each)
 

@@ -35,7 +35,7 @@ COMMANDS = {
 }
 NEEDS_PROPELLER = (Piston, Turboprop, Electric, Brushless)
 SETTLING = 0.5  # [s], JSBSim's step when it lets an engine settle
-MOST_SETTLING, SETTLED = 6000, 120
+MAX_SETTLING, SETTLED = 6000, 120
 
 
 @dataclass(frozen=True)
@@ -103,7 +103,7 @@ class Propulsion:
             code.line("settled = 0")
             # turbines first take a step of no duration
             first = -1 if is_turbine else 0
-            with code.block(f"for k in range({first}, {MOST_SETTLING})"):
+            with code.block(f"for k in range({first}, {MAX_SETTLING})"):
                 code.line(f"settling = {SETTLING!r} if k >= 0 else 0.0")
                 self._emit_unit(bench, unit)
                 thrust = bench.slot("thrust-lbs")

@@ -10,7 +10,7 @@ from tussle.aircraft.code import Code, normal
 from tussle.aircraft.constants import POUND_PER_SLUG
 from tussle.aircraft.node import Element
 from tussle.aircraft.propulsion.bench import given, slot
-from tussle.errors import listed, nearest_name
+from tussle.errors import clipped, listed, nearest_name
 
 Vector = tuple[float, float, float]
 KINDS = ("FUEL", "OXIDIZER")
@@ -100,7 +100,7 @@ def read_tank(node: Element, index: int) -> Tank:
     """
     kind = node.get("type").upper()
     if kind not in KINDS:
-        raise node.error(f"type {kind[:40]!r} is not known{nearest_name(kind, KINDS)}; {listed(KINDS)}")
+        raise node.error(f"type {clipped(kind)!r} is not known{nearest_name(kind, KINDS)}; {listed(KINDS)}")
     for tag in ("unusable-volume",):
         if node.value(tag, 0.0):
             raise node.error(f"<{tag}> is not supported")
@@ -136,7 +136,7 @@ def _grain(node: Element, radius: float, contents: float) -> SolidGrain:
     kind, length = node.get("type"), node.value("length", 0.0, "IN")
     bore = node.value("bore_diameter", 0.0, "IN") / 2.0
     if kind not in ("CYLINDRICAL", "ENDBURNING"):
-        raise node.error(f"type {kind[:40]!r} is not supported; there are: CYLINDRICAL, ENDBURNING")
+        raise node.error(f"type {clipped(kind)!r} is not supported; there are: CYLINDRICAL, ENDBURNING")
     is_cylinder = kind == "CYLINDRICAL"
     volume = math.pi * length * (radius * radius - (bore * bore if is_cylinder else 0.0))
     if not volume > 0.0 or not contents > 0.0:

@@ -88,7 +88,7 @@ def sections_of(data: ReportData) -> list[Section]:
     from tussle.batch.report import sections as of_games
     from tussle.batch.report import variable_sections as of_variables
 
-    chosen = [of_games.look_at, of_games.making]
+    chosen = [of_games.notable_runs, of_games.making]
     if data.n_good:
         effects = [
             of_variables.effects,

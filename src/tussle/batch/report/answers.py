@@ -20,12 +20,12 @@ from tussle.batch.statistics import sign_test
 from tussle.batch.target import Answers
 from tussle.batch.variables import Range
 
-MOST_ASKED = 2
+MAX_ASKED = 2
 """Numbers and choices that are asked for by name, each."""
-MOST_CAUSES = 4
+MAX_CAUSES = 4
 N_ALONG = 41
-MOST_OF_IT = 0.9
-MOST_LINES_SAID = 3
+MAX_OF_IT = 0.9
+MAX_LINES_SAID = 3
 """A choice with at most so many values is told apart where most of a change is done."""
 LITTLE, MUCH = 0.2, 0.6
 """Parts of the variance below which chance plays a small part, and above which it plays the largest."""
@@ -52,15 +52,21 @@ def answers(data: ReportData) -> list[ShortAnswer]:
         return []
     lead = data.measures[0]
     ranked = data.by_strength(lead) if data.axes else []
-    choices = [axis for axis in ranked if not axis.is_number][:MOST_ASKED]
-    amounts = [axis for axis in ranked if axis.is_number][:MOST_ASKED]
+    choices = [axis for axis in ranked if not axis.is_number][:MAX_ASKED]
+    amounts = [axis for axis in ranked if axis.is_number][:MAX_ASKED]
     found = [
-        *(ShortAnswer(f"Which {_short(data, a)}?", text) for a in choices if (text := _which(data, lead, a))),
-        *(ShortAnswer(_how_many(data, a), text) for a in amounts if (text := _how_it_goes(data, lead, a))),
+        *(
+            ShortAnswer(f"Which {_short(data, a)}?", text)
+            for a in choices
+            if (text := _best_value(data, lead, a))
+        ),
+        *(ShortAnswer(_how_many(data, a), text) for a in amounts if (text := _trend(data, lead, a))),
     ]
     extreme, command = _extreme_game(data, lead)
-    found.append(ShortAnswer("What matters?", _what_matters(data, lead)))
-    found.append(ShortAnswer("When did it go wrong?", f"{' '.join(_when(data))} {extreme}".strip(), command))
+    found.append(ShortAnswer("What matters?", _important_variables(data, lead)))
+    found.append(
+        ShortAnswer("When did it go wrong?", f"{' '.join(_losses(data))} {extreme}".strip(), command)
+    )
     found.append(ShortAnswer("Is it luck?", _luck(data, lead)))
     return [each for each in found if each.text]
 
@@ -90,7 +96,7 @@ def _how_many(data: ReportData, axis: FittedVariable) -> str:
     return f"{'How many' if is_count else 'Which'} {_short(data, axis)}?"
 
 
-def _what(data: ReportData, lead: Measure) -> str:
+def _subject(data: ReportData, lead: Measure) -> str:
     return f"The share of games won by {lead.name}" if lead.is_share else capital(data.title(lead.expression))
 
 
@@ -122,8 +128,8 @@ def _difference(lead: Measure, value: float, low: float, high: float) -> str:
 # -- which, and how many ----------------------------------------------------------------------------------------------------
 
 
-def _which(data: ReportData, lead: Measure, axis: FittedVariable) -> str:
-    """The best and the second best value of a choice, and where that turns round."""
+def _best_value(data: ReportData, lead: Measure, axis: FittedVariable) -> str:
+    """Sentence about the best and the second best value of a choice, and about where their order changes."""
     means = data.means_at(axis, lead)[:, 0]
     if not np.isfinite(means).all():
         return ""
@@ -142,10 +148,11 @@ def _which(data: ReportData, lead: Measure, axis: FittedVariable) -> str:
     same = f" at the same {' and '.join(others)}" if 0 < len(others) < 3 else ""
     than = "next best " if len(axis.values) > 2 else ""
     text = (
-        f"{_what(data, lead)} is {_shown(lead, means[first])} with {written(b)} and {_shown(lead, means[second])} with {than}{written(a)}"
+        f"{_subject(data, lead)} is {_shown(lead, means[first])} with {written(b)} and {_shown(lead, means[second])} with "
+        f"{than}{written(a)}"
         f"{same}: {_difference(lead, value, low, high)}."
     )
-    turns = _where_it_turns(data, lead, response, axis, a, b) if response is not None else ""
+    turns = _crossover(data, lead, response, axis, a, b) if response is not None else ""
     return f"{text} {turns}".strip()
 
 
@@ -154,10 +161,10 @@ def _side(data: ReportData, name: str, value: Any) -> int | str:
     return points[0] if len(points) == 1 else f"{name}={written(value)}"
 
 
-def _where_it_turns(
+def _crossover(
     data: ReportData, lead: Measure, response: Response, axis: FittedVariable, a: Any, b: Any
 ) -> str:
-    """Where one value has more at one end of the strongest number and less at the other, or differs at one end only."""
+    """Clause about the value of the strongest number at which two values of a choice change places; "" without one."""
     other = next((other for other in data.by_strength(lead) if other.is_number), None)
     if other is None:
         return ""
@@ -176,8 +183,8 @@ def _where_it_turns(
     return f"{capital(', '.join(parts))}."
 
 
-def _how_it_goes(data: ReportData, lead: Measure, axis: FittedVariable) -> str:
-    """How a quantity follows a number, and where most of the change is done."""
+def _trend(data: ReportData, lead: Measure, axis: FittedVariable) -> str:
+    """Sentence about the trend of a quantity over a number, with the range in which most of the change happens."""
     response, name = data.response(lead), axis.variable.name
     if response is None:
         return ""
@@ -194,27 +201,27 @@ def _how_it_goes(data: ReportData, lead: Measure, axis: FittedVariable) -> str:
         return _known(fit.value[i], fit.low[i], fit.high[i], scale, sign)
 
     if not response.difference(name, at[lowest], at[highest])[1] > 0.0:
-        return f"{_what(data, lead)} does not visibly follow it: {value(0)} at {place(0)}, {value(last)} at {place(last)}."
+        return f"{_subject(data, lead)} does not visibly follow it: {value(0)} at {place(0)}, {value(last)} at {place(last)}."
     for first, far, verb in ((lowest, highest, "rises"), (highest, lowest, "falls")):
         beyond = response.difference(name, at[far], at[last])
         if first == 0 and (far == last or beyond[1] <= 0.0 <= beyond[2]):  # it may end flat
             return (
-                f"{_what(data, lead)} {verb} from {value(0)} at {place(0)} to {value(far)} at {place(far)}; nine tenths of that by "
-                f"{_most_of_it(data, response, axis, at)}{unit}."
+                f"{_subject(data, lead)} {verb} from {value(0)} at {place(0)} to {value(far)} at {place(far)}; nine tenths of that by "
+                f"{_main_change(data, response, axis, at)}{unit}."
             )
-    return f"{_what(data, lead)} is highest at {place(highest)}, {value(highest)}, and lowest at {place(lowest)}, {value(lowest)}."
+    return f"{_subject(data, lead)} is highest at {place(highest)}, {value(highest)}, and lowest at {place(lowest)}, {value(lowest)}."
 
 
-def _most_of_it(data: ReportData, response: Response, axis: FittedVariable, at: Sequence[Any]) -> str:
-    """Where nine tenths of the change from the first place to the extreme one are done, for each value of a choice."""
+def _main_change(data: ReportData, response: Response, axis: FittedVariable, at: Sequence[Any]) -> str:
+    """Value of the number at which 90 % of the change from the first place to the extreme is reached, for each value of a choice."""
     lines, texts = data.lines, []
     held: list[dict[str, Any]] = [{}]
-    if lines is not None and len(lines.values) <= MOST_LINES_SAID:
+    if lines is not None and len(lines.values) <= MAX_LINES_SAID:
         held = [{lines.variable.name: value} for value in lines.values]
     for given in held:
         value = response.along(axis.variable.name, at, given).value
         change = np.abs(value - value[0])
-        place = number(float(f"{at[int(np.argmax(change >= MOST_OF_IT * change.max()))]:.4g}"))
+        place = number(float(f"{at[int(np.argmax(change >= MAX_OF_IT * change.max()))]:.4g}"))
         texts.append(" with ".join([place, *map(written, given.values())]))
     return " and ".join(texts)
 
@@ -222,7 +229,7 @@ def _most_of_it(data: ReportData, response: Response, axis: FittedVariable, at: 
 # -- what matters, and chance -----------------------------------------------------------------------------------------------
 
 
-def _what_matters(data: ReportData, lead: Measure) -> str:
+def _important_variables(data: ReportData, lead: Measure) -> str:
     if not data.axes:
         return "Nothing was varied; games differ by their seeds alone." if data.n_good > 1 else ""
     effects = data.effects(lead)
@@ -231,7 +238,7 @@ def _what_matters(data: ReportData, lead: Measure) -> str:
     ]
     if parts:
         texts = []
-        for name, part, low, high in sorted(parts, key=lambda p: -(p[1] or 0.0))[:MOST_CAUSES]:
+        for name, part, low, high in sorted(parts, key=lambda p: -(p[1] or 0.0))[:MAX_CAUSES]:
             is_known = low is not None and high is not None
             ends = f" ({100.0 * max(low, 0.0):.0f} to {100.0 * min(high, 1.0):.0f})" if is_known else ""  # type: ignore[type-var,operator]
             who = {"seed": "the seed", "unexplained": "what none of them explains"}.get(name, name)
@@ -243,12 +250,12 @@ def _what_matters(data: ReportData, lead: Measure) -> str:
     ranks = sorted((e for e in effects if strength_of(e) is not None), key=lambda e: -(strength_of(e) or 0.0))
     if not ranks:
         return ""
-    texts = [f"{e.variable} {estimate(e.rank_correlation)}" for e in ranks[:MOST_CAUSES]]
+    texts = [f"{e.variable} {estimate(e.rank_correlation)}" for e in ranks[:MAX_CAUSES]]
     return f"Rank correlation with {_low(data, lead)}: {', '.join(texts)}; for parts of the variance there are too few points."
 
 
 def _low(data: ReportData, lead: Measure) -> str:
-    what = _what(data, lead)
+    what = _subject(data, lead)
     return what[:1].lower() + what[1:] if lead.is_share else data.title(lead.expression)
 
 
@@ -267,12 +274,12 @@ def _luck(data: ReportData, lead: Measure) -> str:
         return "No: the games of a point are all alike; their seeds change nothing."
     spread = math.sqrt(float(np.mean([mean.sd**2 for mean in means])))
     part = next((e.first_order for e in data.effects(lead) if e.variable == "seed"), None)
-    said = ""
+    prefix = ""
     if part is not None:
         word = "little" if part < LITTLE else "mostly" if part > MUCH else "partly"
-        said = f"In one game, {word}: the seed makes {percent(part, 0)} of the variance. "
+        prefix = f"In one game, {word}: the seed makes {percent(part, 0)} of the variance. "
     one = f"a game differs from the mean of its point by {_width(lead, spread)} (standard deviation)"
-    return f"{said}{capital(one)}; the mean of a point is known to {known}."
+    return f"{prefix}{capital(one)}; the mean of a point is known to {known}."
 
 
 def _luck_of_seeds(data: ReportData, lead: Measure, known: str) -> str:
@@ -300,8 +307,8 @@ def _width(lead: Measure, value: float) -> str:
 # -- when it went wrong -----------------------------------------------------------------------------------------------------
 
 
-def _when(data: ReportData) -> Iterator[str]:
-    """Yield when entities were lost, and which games failed."""
+def _losses(data: ReportData) -> Iterator[str]:
+    """Yield sentences about the times of losses and about failed games."""
     results = data.results
     lost = [(team, mean) for team in results.diminished for mean in results.means([f"lost[{team}]"])]
     for team, mean in sorted(lost, key=lambda pair: -pair[1].value)[:2]:

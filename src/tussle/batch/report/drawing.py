@@ -200,10 +200,10 @@ def lettering(figure: Figure) -> Iterator[set[str]]:
     missing: set[str] = set()
     for words in figure.findobj(Text):
         words.set_text(visible(words.get_text()))
-    with warnings.catch_warnings(record=True) as said:
+    with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         yield missing
-    for warning in said:
+    for warning in caught:
         glyph = re.match(r"Glyph (\d+) ", str(warning.message))
         if glyph is None:
             warnings.warn_explicit(warning.message, warning.category, warning.filename, warning.lineno)

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from tussle.batch.sensitivity import Effect
     from tussle.batch.statistics import Share
 
-MOST_TICKS = 8
+MAX_TICKS = 8
 """Largest number of values that are all written at an axis."""
 END_COLOURS = dict(zip(("time", "one_team", "all_dead"), NEUTRAL, strict=True))
 """Colours of the reasons for which games end."""
@@ -216,7 +216,7 @@ def response_curves(
         handles[i][0] = (handles[i][0], line)
     if axis.is_log:
         _make_log(plot, "x")
-    elif len(axis.values) <= MOST_TICKS:
+    elif len(axis.values) <= MAX_TICKS:
         plot.set_xticks([float(v) for v in axis.values], [f"{v:.6g}" for v in axis.values])
     plot.set_xlabel(axis_label(axis))
     _value_axis(plot.yaxis, label, is_share=is_share)

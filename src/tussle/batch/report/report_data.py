@@ -30,9 +30,9 @@ _OF_TEAM = re.compile(r"(wins|score|alive|lost)\[(-?\d+)\]")
 
 DRAWN_POINTS = ("lhs", "sobol", "saltelli", "product")
 """Sampling methods that draw points at random from ranges."""
-MOST_VARIABLES = 6
+MAX_VARIABLES = 6
 """Largest number of variables with plots; if there are more, those with the strongest effects are shown."""
-MOST_LINES = 6
+MAX_LINES = 6
 """A choice with at most so many values has a line for each."""
 
 
@@ -113,7 +113,7 @@ class ReportData:
 
     @property
     def has_points(self) -> bool:
-        """There is more than one point."""
+        """True if the batch has more than one point."""
         return len(self.points) > 1
 
     @cached_property
@@ -257,15 +257,15 @@ class ReportData:
     @cached_property
     def shown_axes(self) -> list[FittedVariable]:
         """The variables with plots, in the order in which they were given."""
-        if len(self.axes) <= MOST_VARIABLES:
+        if len(self.axes) <= MAX_VARIABLES:
             return self.axes
-        ranked = self.by_strength()[:MOST_VARIABLES]
+        ranked = self.by_strength()[:MAX_VARIABLES]
         return [axis for axis in self.axes if axis in ranked]
 
     @cached_property
     def lines(self) -> FittedVariable | None:
         """The choice whose values have a line each in the plots: the strongest of few values."""
-        choices = [axis for axis in self.axes if not axis.is_number and len(axis.values) <= MOST_LINES]
+        choices = [axis for axis in self.axes if not axis.is_number and len(axis.values) <= MAX_LINES]
         if len(choices) < 2:
             return choices[0] if choices else None
         return next(axis for axis in self.by_strength() if axis in choices)

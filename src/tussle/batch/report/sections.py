@@ -34,14 +34,14 @@ from tussle.record.event_texts import END_TEXTS, end_text
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-MOST_MEANS = 60
+MAX_MEANS = 60
 MAX_SAID = 3
 """Number of measured quantities in the sentence on the result."""
-MOST_FAILED = 50
-MOST_SLOW = 10
+MAX_FAILED = 50
+MAX_SLOW = 10
 SMALL = 5
 """Teams with fewer entities than the largest by this factor have their own plot."""
-MOST_CURVES = 6
+MAX_CURVES = 6
 """Largest number of points with a curve each in one plot."""
 METHODS = {
     "lhs": "a Latin hypercube",
@@ -157,7 +157,7 @@ def _outside(values: np.ndarray) -> str:
 def scores(data: ReportData) -> Section:
     """The section on the means of all quantities, and their distributions at each of a few points."""
     found = []
-    if len(data.points) <= MOST_CURVES:
+    if len(data.points) <= MAX_CURVES:
         for measures in (data.scores, *((measure,) for measure in data.measured)):
             varied = [m for m in measures if varies(data.known(m.expression))]
             if varied and not data.has_points:
@@ -205,7 +205,7 @@ def _means(data: ReportData) -> ReportTable:
     is_count = is_of_network(results.quantities)  # these have their own section
     asked = [m.expression for m in data.more]
     names = results.telling([*asked, *(name for name in names if not is_count(name))])
-    rows = [_mean_cells(data, name) for name in names[:MOST_MEANS]]
+    rows = [_mean_cells(data, name) for name in names[:MAX_MEANS]]
     interval_, quantiles = ("lowest point", "highest point"), ("5 %", "median", "95 %")
     columns = [
         ("quantity", "text"),
@@ -218,8 +218,8 @@ def _means(data: ReportData) -> ReportTable:
         else "5 %, median and 95 % are quantiles of the games."
     )
     caption += " What is constant, a varied value or another quantity again is left out."
-    if len(names) > MOST_MEANS:
-        caption += f" {len(names) - MOST_MEANS} more quantities are in the tables of the batch."
+    if len(names) > MAX_MEANS:
+        caption += f" {len(names) - MAX_MEANS} more quantities are in the tables of the batch."
     return ReportTable("All quantities", columns, rows, caption)
 
 
@@ -248,7 +248,7 @@ def left(data: ReportData) -> Section:
     size = {team: float(data.known(f"start[{team}]").max(initial=0.0)) for team in teams}
     large = [team for team in teams if size[team] * SMALL >= max(size.values())]
     found = [_left(data, some) for some in (large, [t for t in teams if t not in large]) if some]
-    if 1 < len(data.points) <= MOST_CURVES:
+    if 1 < len(data.points) <= MAX_CURVES:
         found += [_left_by_point(data, team) for team in teams]
     return Section("left", "Who was left", plots=found)
 
@@ -335,8 +335,8 @@ def ended(data: ReportData) -> Section:
     )
 
 
-def look_at(data: ReportData) -> Section:
-    """Games that failed, and those that took longest, with the commands that play them again."""
+def notable_runs(data: ReportData) -> Section:
+    """Section with failed games and those that took longest, and the commands that play them again."""
     results = data.results
     is_file = (results.info.get("mission") or {}).get("made_in") != "python"
     folder = results.path.resolve().name if results.path is not None and is_file else None
@@ -361,15 +361,15 @@ def look_at(data: ReportData) -> Section:
 
     tables = []
     if n := results.n_failed:
-        more = f" {count(n - MOST_FAILED)} more are in the tables of the batch." if n > MOST_FAILED else ""
-        rows = results.failed().slice(0, MOST_FAILED).to_pylist()
+        more = f" {count(n - MAX_FAILED)} more are in the tables of the batch." if n > MAX_FAILED else ""
+        rows = results.failed().slice(0, MAX_FAILED).to_pylist()
         tables.append(
             table(
                 f"{count(n, 'game')} failed", rows, [("error", "text")], lambda row: [row["error"] or ""],
                 f"Failed games are in no share, mean or plot.{more}",
             )
         )  # fmt: skip
-    if rows := results.slowest(MOST_SLOW).to_pylist():
+    if rows := results.slowest(MAX_SLOW).to_pylist():
         tables.append(
             table(
                 "Slowest games", rows, numbers("CPU time", "length [s]"), lambda row: [seconds(row["cpu_s"]), number(row["t"])],

@@ -22,7 +22,7 @@ from tussle.batch.report.formatting import (
     sentence,
     signed,
 )
-from tussle.batch.report.report_data import MOST_VARIABLES, Measure, ReportData, strength_of
+from tussle.batch.report.report_data import MAX_VARIABLES, Measure, ReportData, strength_of
 from tussle.batch.report.sections import Plot, ReportTable, Section, numbers
 from tussle.batch.response import FittedVariable
 from tussle.batch.selection import written
@@ -32,15 +32,15 @@ from tussle.batch.variables import Range
 from tussle.errors import ParameterError
 from tussle.palette import TEAM_COLOURS
 
-MOST_BARS = 40
-"""Up to so many points have their intervals as bars, if nothing else varies behind them."""
-MOST_PLACES = 20
+MAX_BARS = 40
+"""Largest number of points whose intervals are drawn as bars."""
+MAX_PLACES = 20
 """Largest number of choices in a plot, and of points in a table."""
-MOST_PANELS = 3
+MAX_PANELS = 3
 """Maps have a panel for each value of a choice with at most so many values."""
 N_ALONG, N_GRID = 41, 21
 """Places of a fit along a variable, and along each side of a map."""
-MOST_NUMBERS = 6
+MAX_NUMBERS = 6
 """Largest number of values of a numeric choice that are compared in pairs."""
 DASHES = ("-", "--", "-.", ":", (0, (5, 1)), (0, (1, 1)))
 
@@ -51,7 +51,7 @@ def effects(data: ReportData) -> Section:
     found = [_effects_of(data, axes, stem, measures) for stem, measures in data.groups] if axes else []
     hidden = len(data.axes) - len(axes)
     lead = (
-        [f"The {MOST_VARIABLES} of {len(data.axes)} variables with the strongest effects are shown."]
+        [f"The {MAX_VARIABLES} of {len(data.axes)} variables with the strongest effects are shown."]
         if hidden
         else []
     )
@@ -122,12 +122,12 @@ def _curves(data: ReportData, axis: FittedVariable, measures: Sequence[Measure])
 def _has_bars(data: ReportData, axis: FittedVariable) -> bool:
     """Nothing varies behind the points of an axis but what has lines."""
     behind = [other for other in data.axes if other not in (axis, data.lines)]
-    return not behind and len(data.points) <= MOST_BARS
+    return not behind and len(data.points) <= MAX_BARS
 
 
 def _rows(data: ReportData, axis: FittedVariable, measures: Sequence[Measure]) -> Any:
     """Draw the means at each value of a choice."""
-    shown = replace(axis, values=axis.values[:MOST_PLACES])
+    shown = replace(axis, values=axis.values[:MAX_PLACES])
     series = [
         plots.series_of(label, colour, marker, data.means_at(shown, measure, given))
         for measure, given, label, colour, _, marker in _levels(data, axis, measures)
@@ -147,8 +147,8 @@ def _effect_caption(data: ReportData, axis: FittedVariable, measures: Sequence[M
     each = f" for each {lines.variable.name}" if lines is not None else ""
     if not axis.is_number:
         first = (
-            f"the first {MOST_PLACES} of {len(axis.values)} values"
-            if len(axis.values) > MOST_PLACES
+            f"the first {MAX_PLACES} of {len(axis.values)} values"
+            if len(axis.values) > MAX_PLACES
             else "each value"
         )
         how = f"by the fit{held}" if is_fitted else "of its games"
@@ -218,7 +218,7 @@ def _maps_of(
 
 
 def _panels(data: ReportData) -> FittedVariable | None:
-    return data.lines if data.lines is not None and len(data.lines.values) <= MOST_PANELS else None
+    return data.lines if data.lines is not None and len(data.lines.values) <= MAX_PANELS else None
 
 
 def _surfaces(
@@ -264,7 +264,7 @@ def strengths(data: ReportData) -> Section:
     found, remarks = [], dict[str, None]()
     for measure in data.measures if data.axes else ():
         known = [e for e in _effects(data, measure) if strength_of(e) is not None]
-        shown = sorted(known, key=lambda e: -(strength_of(e) or 0.0))[:MOST_PLACES]
+        shown = sorted(known, key=lambda e: -(strength_of(e) or 0.0))[:MAX_PLACES]
         if shown:
             title = f"What {data.title(measure.expression)} depends on"
             caption = "Mark: estimate, the strongest at the top. Bar: its 95 % interval."
@@ -296,7 +296,7 @@ def differences(data: ReportData) -> Section:
     rows, lead = list[list[str]](), []
     for axis in data.axes:
         if isinstance(axis.variable, Range) or len(axis.values) > (
-            MOST_NUMBERS if axis.is_number else MOST_PLACES
+            MAX_NUMBERS if axis.is_number else MAX_PLACES
         ):
             continue
         name = axis.variable.name
@@ -380,8 +380,8 @@ def points(data: ReportData) -> Section:
     if not data.has_points or not data.measures:
         return Section("points", "Point by point")
     columns = [data.mean_by_point(m) for m in data.measures]
-    order, caption, half = np.arange(len(data.points)), "", MOST_PLACES // 2
-    if len(order) > MOST_PLACES:
+    order, caption, half = np.arange(len(data.points)), "", MAX_PLACES // 2
+    if len(order) > MAX_PLACES:
         known = np.flatnonzero(np.isfinite(columns[0]))
         ordered = known[np.argsort(-columns[0][known], kind="stable")]
         order = np.concatenate([ordered[:half], ordered[-half:]])

@@ -18,7 +18,7 @@ from tussle.batch.search.evaluation import Evaluator, RoundPlayer
 from tussle.batch.search.proposals import Proposer
 from tussle.batch.search.study import Study, best_of
 from tussle.batch.search.study_store import StudyStore, notes_on_versions, versions_of_samplers
-from tussle.batch.search.trials import MOST_TRIALS, Point, Trial
+from tussle.batch.search.trials import MAX_TRIALS, Point, Trial
 from tussle.batch.target import Target
 from tussle.batch.variables import Variable
 from tussle.batch.varied import as_variables, variable_entry
@@ -101,7 +101,7 @@ class Optimization:
     ) -> None:
         check_source(mission, "Optimization")
         check_argument("runs", runs, Whole(1))
-        check_argument("per_round", per_round, Whole(1, MOST_TRIALS))
+        check_argument("per_round", per_round, Whole(1, MAX_TRIALS))
         check_argument("sample_seed", sample_seed, Whole())
         check_argument("first_seed", first_seed, Whole(0, 2**64 - 1))
         settings = dict(settings or {})
@@ -200,7 +200,7 @@ class Optimization:
             BatchError: The directory holds another search, another process searches there, or a file has changed meanwhile.
             RecordError: The directory cannot be written.
         """
-        check_argument("trials", trials, Whole(1, MOST_TRIALS))
+        check_argument("trials", trials, Whole(1, MAX_TRIALS))
         player, proposer = RoundPlayer(executor, processes, stack), self._proposer()
         info = {**self.info, "command": list(command or sys.argv)}
         path = None if directory is None else Path(directory)

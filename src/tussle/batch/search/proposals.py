@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     import optuna
 
 SAMPLERS = ("tpe", "cmaes", "random")
-FEWEST_FOR_IMPORTANCE = 20
+MIN_FOR_IMPORTANCE = 20
 """Complete trials for importances."""
 BEST = 0.25
 """Part of the trials that importances compare with all of them; of 20, the tenth that is usual would be two."""
@@ -144,7 +144,7 @@ def importances(
         MissingExtraError: Optuna is not installed.
     """
     complete = [t for t in trials if t.is_complete]
-    if len(complete) < FEWEST_FOR_IMPORTANCE or len(variables) < 2:
+    if len(complete) < MIN_FOR_IMPORTANCE or len(variables) < 2:
         return {}
     if len({t.objective for t in complete}) == 1:
         return {}

@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Any, Self
 
 import pyarrow.parquet as pq
 
-from tussle.batch.consistency import MOST_VALUE
-from tussle.batch.plan import MOST_RUNS
+from tussle.batch.consistency import MAX_VALUE
+from tussle.batch.plan import MAX_RUNS
 from tussle.batch.schemas import SEED, VARIABLE
 from tussle.batch.search.proposals import SAMPLERS, new_study, quiet, require_optuna
 from tussle.batch.search.study import Study
-from tussle.batch.search.trials import MOST_TRIALS, Trial, frozen, thawed, trials_table
+from tussle.batch.search.trials import MAX_TRIALS, Trial, frozen, thawed, trials_table
 from tussle.batch.store import locked, reported
 from tussle.batch.variables import Variable
 from tussle.batch.varied import variable_of
@@ -39,23 +39,23 @@ STUDY = Document(
         "fingerprint": str,
         "objective": str,
         "direction": ("maximize", "minimize"),
-        "runs": Whole(1, MOST_RUNS),
+        "runs": Whole(1, MAX_RUNS),
         "first_seed": SEED,
         "sampler": SAMPLERS,
         "sample_seed": Whole(),
-        "per_round": Whole(1, MOST_TRIALS),
+        "per_round": Whole(1, MAX_TRIALS),
         "constraints": Maybe([str]),
         "versions": Map(str),
     },
     BatchError,
 )
 """Fields of `study.json`."""
-_MEAN = Maybe(Real(-MOST_VALUE, MOST_VALUE))
+_MEAN = Maybe(Real(-MAX_VALUE, MAX_VALUE))
 TRIAL = {
     "value": _MEAN,
     "low": _MEAN,
     "high": _MEAN,
-    "n_failed": Whole(0, MOST_RUNS),
+    "n_failed": Whole(0, MAX_RUNS),
     "error": str,
     "by_seed": [Maybe(Real())],
     "violations": Maybe([Maybe(Real())]),
@@ -68,8 +68,8 @@ COMPARED = (
 """Settings that identify a search, in the order in which differences are reported."""
 PROPOSED_BY = ("optuna", "cmaes", "numpy", "scipy")
 """Packages on whose versions the proposals depend."""
-MOST_JOURNAL = 1 << 28
-"""Of a journal [B]."""
+MAX_JOURNAL = 1 << 28
+"""Largest size of a journal [B]."""
 
 
 class StudyStore:
@@ -128,7 +128,7 @@ class StudyStore:
         with reported(self.path):
             (self.path / f"{JOURNAL_FILE}.lock").unlink(missing_ok=True)
             if journal.exists():
-                whole = read_text(journal, BatchError, MOST_JOURNAL).rpartition("\n")
+                whole = read_text(journal, BatchError, MAX_JOURNAL).rpartition("\n")
                 os.truncate(journal, len((whole[0] + whole[1]).encode()))
 
     def add(self, trials: Sequence[Trial]) -> None:
@@ -206,7 +206,7 @@ def read_trials(path: Path, info: Mapping[str, Any]) -> list[Trial]:
     require_optuna()
     import optuna
 
-    read_text(file, BatchError, MOST_JOURNAL)
+    read_text(file, BatchError, MAX_JOURNAL)
     variables: list[Variable] = [variable_of(entry) for entry in info["variables"]]
     try:
         with quiet():
@@ -227,8 +227,8 @@ def read_trials(path: Path, info: Mapping[str, Any]) -> list[Trial]:
 def _against(i: int, trial: Any, info: Mapping[str, Any]) -> str:
     """Return what is wrong with a trial of the journal; "" if it is valid."""
     facts = {"value": trial.value, **trial.user_attrs}
-    if i >= MOST_TRIALS or (violation := problem(facts, TRIAL, f"trial {i}")):
-        return violation if i < MOST_TRIALS else f"has more than {MOST_TRIALS:,} trials"
+    if i >= MAX_TRIALS or (violation := problem(facts, TRIAL, f"trial {i}")):
+        return violation if i < MAX_TRIALS else f"has more than {MAX_TRIALS:,} trials"
     low, high, n_games = facts["low"], facts["high"], len(facts["by_seed"])
     if (low is None) != (high is None) or (low is not None and low > high):
         return f"trial {i}: low = {low} is not allowed; high is {high}"

@@ -28,7 +28,7 @@ FACTS = pa.schema(
 )  # fmt: skip
 """Columns of every table of trials; the variables stand behind the first two."""
 N_KEYS = 2
-MOST_TRIALS = 10_000
+MAX_TRIALS = 10_000
 """Samplers look at all trials before each round."""
 DIGITS = 6
 """Significant digits of a range's width in proposed values: finer than any game shows, and few enough to type."""

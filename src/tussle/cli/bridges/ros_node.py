@@ -14,11 +14,11 @@ from tussle.engine.wiring import written_channels
 from tussle.errors import ParameterError, RosError
 from tussle.mission import Block, Mission
 from tussle.numeric.quaternion import quat_from_euler, quat_rotate, quat_rotate_inverse, quat_to_yaw
+from tussle.pacing import POLL_PERIOD
 from tussle.plugins.links.ros.link import RosLink
 from tussle.plugins.links.ros.node import checked_namespace
 from tussle.plugins.stock import External
 
-NAP = 0.05  # [s] longest wait before Ctrl-C is noticed
 DRIVES = "speed", "velocity_x"
 """Channels of which an autonomy writes one."""
 
@@ -117,7 +117,7 @@ def serve(host: AutonomyHost, namespace: str, is_interrupted: Callable[[], bool]
             if link.lost:
                 raise RosError(link.lost)
             try:
-                message = news.get(timeout=NAP)
+                message = news.get(timeout=POLL_PERIOD)
             except queue.Empty:
                 continue
             state = state_of(message)

@@ -81,7 +81,7 @@ class TopicBuffer:
         return found
 
     def retain(self, first: int, keep: Callable[[Messages], np.ndarray]) -> None:
-        """Withdraw the messages of the outbox from batch number `first` on where keep(batch), (n,), is false."""
+        """Remove messages from the outbox, from batch number `first` on, where keep(batch), (n,), is false."""
         kept = [batch.take(np.flatnonzero(keep(batch))) for batch in self.sent[first:]]
         self.sent[first:] = [batch for batch in kept if batch.n]
         self._joined = None

@@ -31,10 +31,10 @@ class Blocks:
     """Groups of up to LANES nearby query rows, each with the spans of places that contain its neighbours.
 
     Block b holds queries[block_first[b] : block_first[b + 1]]; its candidates are the places span_start[s] to span_end[s] - 1 for s
-    from span_first[b] to span_last[b] - 1. This is the order of (cell row, cell, id), independent of the stack.
+    from span_first[b] to span_last[b] - 1. The blocks of a world do not depend on the stack.
 
     Attributes:
-        cuts: queries, block_first, block_strip, span_first, span_last, (5, n + 1); queries are the n sorted places of the query rows.
+        cuts: queries, block_first, block_strip, span_first, span_last, (5, n + 1); queries are the n places of the query rows.
         spans: span_start and span_end, (2, number of spans or more).
         points: Positions of the queries [m], (3, n + LANES); the padding may be read.
         n_blocks: Number of blocks.

@@ -220,19 +220,33 @@ def query_positions(queries, points, out, part):
         out[2, k] = points[2, p]
 
 
-@kernel("I I I i8 i8 Iw Iw Iw -> i8")
-def group_queries(order, strip_start, world_strip, first, last, queries, block_first, block_strip):
-    """Split the places of rows [first, last) into blocks of up to LANES places of one strip. Returns the number of blocks."""
-    n_strips = world_strip[world_strip.shape[0] - 1]
+FINE, MAX_FINE = 64.0, float(1 << 29)
+"""Queries of a strip are ordered by the 64ths of a cell that they lie in, up to so many from the origin."""
+
+
+@device
+def group_queries(index, inverse_cell, first, last, x, cuts):
+    """Split the places of rows [first, last) into blocks of up to LANES places of one strip, from west to east. Returns their number.
+
+    The more compact a block, the fewer candidates it has; results do not depend on which rows share a block.
+    """
+    order, strips, world_strip, _, _ = index
+    strip_start, strip_world = strips[0], strips[1]
+    queries, block_first, block_strip, scratch = cuts[0], cuts[1], cuts[2], cuts[3]
     n_blocks = 0
     done = 0
-    for strip in range(n_strips):
+    for strip in range(world_strip[world_strip.shape[0] - 1]):
         begin = done
+        inverse = FINE * inverse_cell[strip_world[strip]]
         for p in range(strip_start[strip], strip_start[strip + 1]):
             row = order[p]
             if done < last - first:
-                queries[done] = p
+                queries[done] = (cell_of(x[p], inverse, MAX_FINE) << 32) | p
             done += (row >= first) & (row < last)
+        if inverse != 0.0:
+            sort_keys(queries, scratch, begin, done)
+        for k in range(begin, done):
+            queries[k] &= 0xFFFFFFFF
         while begin < done:
             block_first[n_blocks] = begin
             block_strip[n_blocks] = strip
@@ -370,13 +384,10 @@ def cut_blocks(index, rows, points, cells, arrays, out, part):
     find spans for, b1 -1 for all, and the range of spans for them. Returns the number of blocks, the end of the spans, which may
     exceed that range, and the largest number of candidates of one block.
     """
-    order, strips, world_strip, _, _ = index
     cuts = arrays[0]
     phases, b0, b1, s0, s1 = part
     if phases & GROUP:
-        first, last = rows
-        queries = cuts[0, : last - first]
-        b1 = group_queries(order, strips[0], world_strip, first, last, queries, cuts[1], cuts[2])
+        b1 = group_queries(index, cells[0], rows[0], rows[1], points[0], cuts)
     used, most = s0, 0
     if phases & SPANS:
         query_positions(cuts[0], points, out, (cuts[1, b0], cuts[1, b1]))

@@ -29,17 +29,18 @@ from tussle.numeric.kernel import Device, device
 from tussle.numeric.neighbors import lanes
 from tussle.numeric.neighbors.lane_count import LANES
 from tussle.numeric.rk4 import label
+from tussle.numeric.source import define, indented
 
 ARITHMETIC = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/"}
 COMPARISONS = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!="}
-MOST_POWER = 8
+MAX_POWER = 8
 ROOTS = (math.sqrt, np.sqrt)
 SIZES = (abs, math.fabs, np.abs)
 LANE_FUNCTIONS = (
     "splat", "choose", "truth", "number", "joined", "lane_of", "lanes_sqrt", "lanes_abs"
 )  # fmt: skip
 TAKES = (
-    f"supported are assignments, if, elif, else, return, + - * /, ** with a whole exponent from 1 to {MOST_POWER}, comparisons, and, or, "
+    f"supported are assignments, if, elif, else, return, + - * /, ** with a whole exponent from 1 to {MAX_POWER}, comparisons, and, or, "
     "not, x if c else y, abs, min, max, sqrt, the functions of tussle.numeric and math, and functions written with these"
 )
 
@@ -90,14 +91,9 @@ def lane_code(function: Callable[..., Any], inside: tuple[Any, ...] = ()) -> Lan
     if result is None:
         raise writer.refusal(writer.tree, "it returns no value")
     names = [value.name for value in result.values] + ([result.counts] if result.counts else [])
-    text = "\n    ".join([
-        f"def {writer.tree.name}({', '.join(a.arg for a in writer.tree.args.args)}):",
-        *writer.lines,
-        f"return ({', '.join(names)},)",
-    ])  # fmt: skip
-    exec(text + "\n", writer.scope)  # noqa: S102 - the text above is generated from a checked tree
-    made = writer.scope[writer.tree.name]
-    made.__module__, made.__qualname__ = function.__module__, f"{function.__qualname__}.lanes"
+    head = f"def {writer.tree.name}({', '.join(a.arg for a in writer.tree.args.args)}):"
+    lines = [head, *indented(1, [*writer.lines, f"return ({', '.join(names)},)"])]
+    made = define(lines, writer.scope, function.__module__, f"{function.__qualname__}.lanes")
     return LaneCode(device(made), tuple(value.is_mask for value in result.values), bool(result.counts))
 
 
@@ -335,7 +331,7 @@ class Writer:
         """A binary operation on numbers."""
         if isinstance(node.op, ast.Pow):
             power = node.right.value if isinstance(node.right, ast.Constant) else None
-            if not isinstance(power, int) or not 1 <= power <= MOST_POWER:
+            if not isinstance(power, int) or not 1 <= power <= MAX_POWER:
                 raise self.refusal(node, f"`{ast.unparse(node)}` is not supported")
             base = self.number(self.value(node.left, env))
             return self.new(" * ".join([base] * power))

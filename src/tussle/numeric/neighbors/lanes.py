@@ -64,7 +64,10 @@ def splat(value: Any) -> Any:
 
 @LaneFunction
 def load(array: Any, start: int) -> Any:
-    """Load elements start to start + 7 of a contiguous float64 array. No bounds check: allocate LANES spare elements."""
+    """Load elements start to start + 7 of a contiguous float64 array, or of an int64 array for `unlike`.
+
+    No bounds check: allocate LANES spare elements.
+    """
     found = array[start : start + LANES]
     return np.concatenate([found, np.zeros(LANES - len(found))])
 
@@ -139,6 +142,24 @@ def lowest(hits: int) -> int:
 def ones(hits: int) -> int:
     """Number of set bits."""
     return hits.bit_count()
+
+
+@LaneFunction
+def unlike(lanes: Any, whole: int) -> Any:
+    """Mask of the lanes, loaded from an int64 array, that are not equal to a whole number."""
+    return lanes != whole
+
+
+@LaneFunction
+def pack(array: Any, n: int, start: int, hits: int) -> int:
+    """Write start + k for each set bit k of `hits` to an int64 array from element n on. Returns the next n.
+
+    No bounds check, and up to LANES elements are written to: allocate as many spare ones.
+    """
+    for k in range(LANES):
+        array[n] = start + k
+        n += (hits >> k) & 1
+    return n
 
 
 @LaneFunction

@@ -278,6 +278,11 @@ def _generate_bits(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     return builder.zext(builder.bitcast(args[0], ir.IntType(LANES)), ir.IntType(64))
 
 
+@_implement("unlike", MASK_TYPE, LANES_TYPE, types.int64)
+def _generate_unlike(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    return builder.icmp_signed("!=", builder.bitcast(args[0], _LONGS), _splat(builder, args[1], _LONGS))
+
+
 @_implement("lane_of", types.float64, LANES_TYPE, types.int64)
 def _generate_lane_of(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     return builder.extract_element(*args)
@@ -296,6 +301,25 @@ def _generate_lowest(context: Any, builder: Any, sig: Any, args: Any) -> Any:
 @_implement("ones", types.int64, types.int64)
 def _generate_ones(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     return _call_llvm(builder, "llvm.ctpop.i64", ir.IntType(64), [args[0]])
+
+
+@_implement("pack", types.int64, types.Array, types.int64, types.int64, types.int64)
+def _generate_pack(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    array, n, start, hits = args
+    rows = cgutils.global_constant(
+        builder, "packed_lanes", ir.Constant(ir.ArrayType(ir.IntType(64), 256), _packed())
+    )
+    zero = ir.Constant(ir.IntType(64), 0)
+    row = builder.bitcast(builder.load(builder.gep(rows, [zero, hits])), ir.VectorType(ir.IntType(8), LANES))
+    places = builder.add(builder.zext(row, _LONGS), _splat(builder, start, _LONGS))
+    pointer = _pointer(context, builder, sig.args[0], array, n)
+    builder.store(places, builder.bitcast(pointer, _LONGS.as_pointer()), align=8)
+    return builder.add(n, _call_llvm(builder, "llvm.ctpop.i64", ir.IntType(64), [hits]))
+
+
+def _packed() -> list[int]:
+    """For each mask of eight bits, the numbers of the bits that are set, one in each byte from the lowest on."""
+    return [int.from_bytes(bytes(k for k in range(8) if mask >> k & 1), "little") for mask in range(256)]
 
 
 @_implement("lanes_sqrt", LANES_TYPE, LANES_TYPE)

@@ -18,11 +18,12 @@ from tussle.numeric.kernel import Kernel, device, is_interpreted, kernel
 from tussle.numeric.neighbors import lanes
 from tussle.numeric.neighbors.lane_code import lane_code
 from tussle.numeric.neighbors.lane_count import LANES
-from tussle.numeric.neighbors.lanes import bits, choose, load
+from tussle.numeric.neighbors.lanes import bits, choose, load, pack
 from tussle.numeric.neighbors.law import Law
 from tussle.numeric.neighbors.walk_python import walk_in_python
 from tussle.numeric.neighbors.walk_text import Part, WalkText
 from tussle.numeric.rk4 import label
+from tussle.numeric.source import define
 
 
 @dataclass(frozen=True)
@@ -64,9 +65,7 @@ def find_near(begin, end, span_start, span_end, places, box, reach2, found):  # 
         for p in range(span_start[s], span_end[s], LANES):
             hit = bits(squared_gap(load(sx, p), load(sy, p), load(sz, p), box) < reach2)
             hit &= (1 << min(LANES, span_end[s] - p)) - 1
-            for k in range(LANES):
-                found[n] = p + k
-                n += (hit >> k) & 1
+            n = pack(found, n, p, hit)
     return n
 
 
@@ -82,14 +81,8 @@ def find_teams(begin, end, span_start, span_end, places, team, wanted, box, reac
             if hit == 0:
                 continue
             mine = hit & bits(load(team, p) == wanted)
-            for k in range(LANES):
-                mates[n_mates] = p + k
-                n_mates += (mine >> k) & 1
-            hit ^= mine
-            if hit != 0:
-                for k in range(LANES):
-                    others[n_others] = p + k
-                    n_others += (hit >> k) & 1
+            n_mates = pack(mates, n_mates, p, mine)
+            n_others = pack(others, n_others, p, hit ^ mine)
     return n_mates, n_others
 
 
@@ -127,6 +120,7 @@ FROM_LANES = [
     "splat",
     "store",
     "truth",
+    "unlike",
 ]
 
 
@@ -165,11 +159,8 @@ def make_walk(laws: Sequence[Law], where: Law | None, code_of: Callable[[str], s
     out = "(I2w F2w) i8 (i8 i8) i8 -> i8" if text.lists_pairs else "F2w i8 (i8 i8) i8"
 
     def written(lines: Iterable[str], points: str, suffix: str) -> Kernel:
-        exec("\n".join(lines) + "\n", scope)  # noqa: S102 - generated here; authors' code is in separate functions
-        made = scope["walk"]
-        made.__module__ = laws[0].function.__module__
         names = (law.function.__qualname__ for law in (*laws, *([where] if where else [])))
-        made.__qualname__ = "+".join(names) + suffix
+        made = define(lines, scope, laws[0].function.__module__, "+".join(names) + suffix)
         return kernel(f"(I2 I2 I) ({points}) ({other}) ({own}) {out}")(made)
 
     kernel_of_blocks = written(text.lines(), "F2 F2", "")

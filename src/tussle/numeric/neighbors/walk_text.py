@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 
 from tussle.numeric.neighbors.law import OTHER, Law
+from tussle.numeric.source import indented
 
 START = {"min": math.inf, "max": -math.inf, "nearest": math.nan}
 """Initial values of reductions that do not start at 0."""
@@ -131,7 +132,7 @@ class Part:
 class WalkText:
     """Source text of a pair-loop kernel.
 
-    The scratch array `lane` holds groups of LANES numbers: place of each lane, its own columns, squared radii, then results.
+    The scratch array `lane` holds groups of LANES numbers: the lanes' own columns, squared radii, then results.
 
     Args:
         parts: The laws.
@@ -152,7 +153,7 @@ class WalkText:
         self.taken = [name for name in self.own if any(name in part.law.arguments for part in every)]
         self.limits = list(dict.fromkeys(part.law.radii for part in parts))
         self.lists = list(dict.fromkeys(part.law.teams for part in parts))
-        self.limits_at = 1 + len(self.taken)
+        self.limits_at = len(self.taken)
         self.results_at = self.limits_at + len(self.limits)
         self.lists_pairs = parts[0].law.lists
 
@@ -280,8 +281,7 @@ class WalkText:
         yield "    q = q0 + min(k, width - 1)"
         yield "    i = order[queries[q]] - first"
         yield f"    active = {active}"
-        yield "    lane[k] = queries[q]"
-        for at, name in enumerate(self.taken, 1):
+        for at, name in enumerate(self.taken):
             yield f"    lane[{at} * LANES + k] = by_row_{name}[i]"
         for at, radii in enumerate(self.limits):
             yield f"    limit_{at} = {square(radii)} if active else -1.0"
@@ -306,8 +306,8 @@ class WalkText:
 
     def load_lanes(self) -> Iterator[str]:
         """Code that loads values that are the same for all candidates."""
-        yield "me = load(lane, 0)"
-        for at, name in enumerate(self.taken, 1):
+        yield "me = load(queries, q0)"
+        for at, name in enumerate(self.taken):
             yield f"{name}_ = load(lane, {at} * LANES)"
         for at in range(len(self.limits)):
             yield f"limit2_{at} = load(lane, {self.limits_at + at} * LANES)"
@@ -349,7 +349,7 @@ class WalkText:
         for name in sorted(taken):
             if name.startswith(OTHER):
                 yield f"{name}_ = splat(by_place_{name}[p])"
-        me = "" if teams == "other" else " & (me != float(p))"
+        me = "" if teams == "other" else " & unlike(me, p)"
         yield f"inside = (distance_squared_ < limit2_{number}){me}"
         if self.where:
             yield from self.where.contributions()
@@ -383,8 +383,3 @@ def square(radii: tuple[str | float, ...]) -> str:
         value = f"by_row_{radius}[i]" if isinstance(radius, str) else repr(float(radius))
         text = f"min({text}, square_of({value}))" if text else f"square_of({value})"
     return text
-
-
-def indented(depth: int, lines: Iterable[str]) -> Iterator[str]:
-    """Indent lines."""
-    return ("    " * depth + line for line in lines)

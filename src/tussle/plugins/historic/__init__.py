@@ -32,7 +32,7 @@ def __getattr__(name: str) -> Any:
     if not name.startswith("_") and name in manifest():
         return load(name)
     hint = "" if name.startswith("_") else nearest_name(name, manifest())
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}{hint}")
+    raise AttributeError(f"module 'tussle.historic' has no attribute {name!r}{hint}")
 
 
 def __dir__() -> list[str]:

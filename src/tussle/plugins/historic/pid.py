@@ -7,7 +7,7 @@ from typing import Any
 from tussle.numeric.kernel import device
 from tussle.plugins.historic.angles import angle_pi
 
-SHORTEST = 1e-9
+MIN_DT = 1e-9
 """Least time that a difference is divided by [s]."""
 
 
@@ -24,7 +24,7 @@ def pid_loop(error: Any, gains: Any, memory: Any, dt: Any) -> Any:
     kp, ki, kd, band = gains
     integral, last, _ = memory
     integral = 0.0 if abs(error) > band else integral + error * dt
-    command = kp * error + ki * integral + kd * ((error - last) / max(SHORTEST, dt))
+    command = kp * error + ki * integral + kd * ((error - last) / max(MIN_DT, dt))
     return command, (integral, error, 1.0)
 
 

@@ -89,7 +89,7 @@ def __getattr__(name: str) -> Any:
     if not name.startswith("_") and name in manifest():
         return load(name)
     raise AttributeError(
-        f"module {__name__!r} has no attribute {name!r}{nearest_name(name, manifest()) if not name.startswith('_') else ''}"
+        f"module 'tussle.stock' has no attribute {name!r}{nearest_name(name, manifest()) if not name.startswith('_') else ''}"
     )
 
 

@@ -23,7 +23,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tussle.errors import MissingExtraError, ParameterError, ViewError
+from tussle.documents import POSITIVE, Maybe, check_argument
+from tussle.errors import MissingExtraError, ViewError
 from tussle.record.plugin_columns import PluginColumn
 from tussle.view.export.film.prescan import crowd_of
 from tussle.view.export.foxglove_scene import WORLD, SceneEntities, scenery_entities, stamp
@@ -36,7 +37,7 @@ if TYPE_CHECKING:
     from foxglove import Context
 
 CHUNK = 1 << 20
-"""Bytes that are compressed together; a reader that jumps reads as much."""
+"""Size of a chunk that is compressed as one [B]; a reader that seeks reads one."""
 SPACING = 0.5
 """Length of a model as a share of the median distance between neighbours, where it would be too small to be seen."""
 N_SPACINGS = 20
@@ -85,9 +86,8 @@ def write_mcap(
         ViewError: There is nothing to write, or the file cannot be written.
         MissingExtraError: The package foxglove-sdk is not installed.
     """
-    for name, value in (("period", period), ("scale", scale)):
-        if value is not None and not 0.0 < value < math.inf:
-            raise ParameterError(f"{name} = {value!r} is not allowed; it takes a number > 0")
+    check_argument("period", period, Maybe(POSITIVE))
+    check_argument("scale", scale, Maybe(POSITIVE))
     kept = kept_frames(recording.t, period)
     if not len(kept):
         raise ViewError(f"{recording.path}: the run holds no states, so there is nothing to write")
@@ -140,7 +140,7 @@ def default_scale(recording: Recording) -> float:
 
 
 class _Messages:
-    """The topics of a file that is open."""
+    """Writer of the topics of an open file."""
 
     def __init__(self, recording: Recording, report: McapReport, context: Context) -> None:
         from foxglove import Channel

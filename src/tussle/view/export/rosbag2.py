@@ -23,7 +23,7 @@ from tussle.view.recording import Recording
 from tussle.world.scene import Scene
 
 VERSION: Literal[8] = 8
-"""Of the format: the oldest that rosbags writes."""
+"""Version of the format: the oldest that the package rosbags writes."""
 MAX_TIME = 2.0**31
 """Stamps of ROS are less [s]."""
 METADATA = "metadata.yaml"
@@ -115,7 +115,7 @@ def write_rosbag2(
 
 
 class _Bag:
-    """A bag that is open."""
+    """Writer of an open rosbag2."""
 
     def __init__(self, writer: Any, prefix: str, scene: Scene) -> None:
         from rosbags.typesys import Stores, get_typestore

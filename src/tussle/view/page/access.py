@@ -13,22 +13,22 @@ from tussle.errors import ViewError
 LOOPBACK_NAMES = ("127.0.0.1", "localhost", "[::1]")
 EVERYWHERE = ("0.0.0.0", "::")  # noqa: S104 - they are compared, not bound
 TOKEN_BYTES = 16
-MOST_BROWSERS = 32
+MAX_BROWSERS = 32
 """Largest number of connected browsers."""
-MOST_BYTES = 16 * 1024
-"""Of one message from a browser; the longest that a control sends has some hundred."""
-MOST_UNSENT = 64 * 1024
-"""Bytes that a browser has not taken yet when sending to it pauses."""
+MAX_BYTES = 16 * 1024
+"""Largest size of a message from a browser [B]; controls send some hundred."""
+MAX_UNSENT = 64 * 1024
+"""Number of unsent bytes at which sending to a browser pauses."""
 PORT = 8123
 """Default port; if it is taken, the next free one is used."""
-MOST_PORTS = 100
+MAX_PORTS = 100
 HEADERS = {
     "Referrer-Policy": "no-referrer",
     "Content-Security-Policy": "frame-ancestors 'none'",
     "X-Content-Type-Options": "nosniff",
     "Cache-Control": "no-store",
 }
-"""Of each answer: nobody else learns the address, and no other page shows this one inside itself."""
+"""Headers of each answer: browsers pass the address to nobody, and no other page embeds this one."""
 
 
 class Access:
@@ -89,7 +89,7 @@ def bound_socket(host: str, wanted: int | None) -> socket.socket:
     Raises:
         ViewError: There is none, the one that is wanted is taken, or the host is not this machine's.
     """
-    ports = [wanted] if wanted is not None else list(range(PORT, PORT + MOST_PORTS))
+    ports = [wanted] if wanted is not None else list(range(PORT, PORT + MAX_PORTS))
     refusal: OSError | None = None
     for port in ports:
         try:
@@ -107,5 +107,5 @@ def bound_socket(host: str, wanted: int | None) -> socket.socket:
             bound.close()
         else:
             return bound
-    where = f"port {wanted}" if wanted is not None else f"ports {PORT} to {PORT + MOST_PORTS - 1}"
+    where = f"port {wanted}" if wanted is not None else f"ports {PORT} to {PORT + MAX_PORTS - 1}"
     raise ViewError(f"the page cannot be served at {host}, {where}: {refusal}")

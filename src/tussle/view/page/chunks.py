@@ -25,7 +25,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tussle.view.frame import Frame
-from tussle.view.page.packing import MOST, column, ints, reals
+from tussle.view.page.packing import MAX_VALUE, column, ints, reals
 
 STEP = 0.002
 """Coarsest step of positions [m]."""
@@ -65,7 +65,7 @@ def grain_of(pos: np.ndarray, health: np.ndarray, step: float) -> Grain:
     low, high = pos.min(axis=0), pos.max(axis=0)
     x, y, z = (float(c) for c in low)
     full = float(np.nan_to_num(health, posinf=0.0).max())
-    return Grain((x, y, z), max(step, float((high - low).max()) / MOST), full)
+    return Grain((x, y, z), max(step, float((high - low).max()) / MAX_VALUE), full)
 
 
 def step_of(low: np.ndarray, high: np.ndarray, smallest: float) -> float:
@@ -78,7 +78,7 @@ def step_of(low: np.ndarray, high: np.ndarray, smallest: float) -> float:
     """
     diagonal, widest = float(np.linalg.norm(high - low)), float((high - low).max())
     wanted = min(STEP, smallest / STEPS_OF_BODY, diagonal / STEPS_OF_EXTENT if diagonal > 0.0 else STEP)
-    return max(_round_down(wanted), widest / MOST)
+    return max(_round_down(wanted), widest / MAX_VALUE)
 
 
 def position_error(step: float) -> float:

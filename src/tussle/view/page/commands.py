@@ -8,69 +8,40 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from tussle.documents import Checked, Either, Maybe, Real, Rule, Whole, check_argument, problem
 from tussle.errors import ParameterError
 from tussle.view.live import Live
 
-FARTHEST = 1e12
-"""Of any coordinate [m] and time [s]."""
-LARGEST_ID = 2**31 - 1
+MAX_COORDINATE = 1e12
+"""Largest coordinate [m] and time [s] in a command."""
+MAX_ID = 2**31 - 1
 REACH = 1e3
 """Largest distance of a point of the world, in sizes of the scene."""
-MOST_WANTED = 64
+MAX_WANTED = 64
 """Quantities of the curves that one browser can choose."""
 CUSTOM_KEY = ";"
 """The key that is kept for the plugins, as in SCRIMMAGE."""
-SHOWN = 40
-"""Characters of a refused value in the words about it."""
 
 
-@dataclass(frozen=True)
-class Check:
-    """Checks the value of a field.
-
-    Attributes:
-        holds: Whether a value is one of them.
-        allowed: They in words.
-    """
-
-    holds: Callable[[Any], bool]
-    allowed: str
+COORDINATE, ID = Real(-MAX_COORDINATE, MAX_COORDINATE), Whole(0, MAX_ID)
 
 
-def number(low: float = -FARTHEST, high: float = FARTHEST) -> Check:
-    """Return a check for a number in a range; NaN is never allowed."""
-    return Check(
-        lambda value: type(value) in (int, float) and low <= value <= high,
-        f"a number from {low:g} to {high:g}",
+def _point_problem(value: list[Any], _: str) -> str:
+    return "" if len(value) == 3 else "it has not three numbers"
+
+
+def _wanted_problem(value: list[Any], _: str) -> str:
+    is_good = len(value) <= MAX_WANTED and all(
+        len(pair) == 2 and not problem(pair[0], str) and not problem(pair[1], ID) for pair in value
     )
+    return "" if is_good else "it has too many, or no pairs"
 
 
-def whole(low: int, high: int) -> Check:
-    """Return a check for an integer in a range."""
-    return Check(
-        lambda value: type(value) is int and low <= value <= high, f"a whole number from {low} to {high}"
-    )
-
-
-WHO = whole(0, LARGEST_ID)
-POINT = Check(
-    lambda value: isinstance(value, list) and len(value) == 3 and all(map(number().holds, value)),
-    "x, y, z in m",
-)
-WANTED = Check(
-    lambda value: (
-        isinstance(value, list)
-        and len(value) <= MOST_WANTED
-        and all(
-            isinstance(v, list) and len(v) == 2 and isinstance(v[0], str) and WHO.holds(v[1]) for v in value
-        )
-    ),
-    f"at most {MOST_WANTED} pairs of a name and an id",
-)
-KEY = Check(lambda value: value == CUSTOM_KEY, f"the key {CUSTOM_KEY}")
-WARP = Check(
-    lambda value: value is None or number(1e-6, 1e6).holds(value), "a number from 1e-06 to 1e+06, or null"
-)
+POINT = Either((Checked([COORDINATE], _point_problem),), "x, y, z in m")
+PAIRS = [Either((str, ID), "a name and an id")]
+WANTED = Either((Checked([PAIRS], _wanted_problem),), f"at most {MAX_WANTED} pairs of a name and an id")
+KEY = Either(((CUSTOM_KEY,),), f"the key {CUSTOM_KEY}")
+WARP = Either((Maybe(Real(1e-6, 1e6)),), "a number from 1e-06 to 1e+06, or null")
 
 
 @dataclass(frozen=True)
@@ -84,7 +55,7 @@ class Command:
     """
 
     do: Callable[..., None]
-    fields: Mapping[str, Check] = field(default_factory=dict)
+    fields: Mapping[str, Rule] = field(default_factory=dict)
     steers: bool = True
 
 
@@ -106,12 +77,12 @@ def game_commands(live: Live) -> dict[str, Command]:
     return {
         "pause": Command(live.pause),
         "resume": Command(live.resume),
-        "step": Command(live.step, {"n": whole(-1000, 1000)}),
-        "seek": Command(seek, {"t": number()}),
+        "step": Command(live.step, {"n": Whole(-1000, 1000)}),
+        "seek": Command(seek, {"t": COORDINATE}),
         "warp": Command(warp, {"value": WARP}),
         "faster": Command(live.faster),
         "slower": Command(live.slower),
-        "reset": Command(live.reset, {"seed": whole(0, LARGEST_ID)}),
+        "reset": Command(live.reset, {"seed": ID}),
         "point": Command(point, {"pos": POINT}),
         "key": Command(live.publish_key, {"key": KEY}),
     }
@@ -128,18 +99,15 @@ def read_command(text: Any, commands: Mapping[str, Command]) -> tuple[str, dict[
         ParameterError: A field's value is not allowed.
     """
     try:
-        said = json.loads(text, parse_constant=lambda _: math.nan) if isinstance(text, str) else None
+        given = json.loads(text, parse_constant=lambda _: math.nan) if isinstance(text, str) else None
     except (ValueError, RecursionError):
         return None
-    if not isinstance(said, dict):
+    if not isinstance(given, dict):
         return None
-    name = said.pop("do", None)
+    name = given.pop("do", None)
     command = commands.get(name) if isinstance(name, str) else None
-    if command is None or said.keys() != command.fields.keys():
+    if command is None or given.keys() != command.fields.keys():
         return None
-    for key, check in command.fields.items():
-        if not check.holds(said[key]):
-            shown = repr(said[key])
-            shown = shown if len(shown) <= SHOWN else f"{shown[:SHOWN]} …"
-            raise ParameterError(f"{key} = {shown} is not allowed; it takes {check.allowed}")
-    return name, said
+    for key, rule in command.fields.items():
+        check_argument(key, given[key], rule)
+    return name, given

@@ -27,7 +27,7 @@ PALE = 0.55
 PAPER: Colour = (200, 205, 212)
 GAP = 0.15
 """Between two runs side by side, of their width."""
-MOST_NAMED = 4
+MAX_NAMED = 4
 """Entities that are named where two runs differ."""
 
 
@@ -85,8 +85,8 @@ def what_differs(a: Frame, b: Frame) -> str:
 
 def _named(ids: np.ndarray) -> str:
     """List a few ids as text."""
-    some = ", ".join(str(i) for i in ids[:MOST_NAMED])
-    more = f" and {len(ids) - MOST_NAMED:,} more" if len(ids) > MOST_NAMED else ""
+    some = ", ".join(str(i) for i in ids[:MAX_NAMED])
+    more = f" and {len(ids) - MAX_NAMED:,} more" if len(ids) > MAX_NAMED else ""
     return f"{'entity' if len(ids) == 1 else 'entities'} {some}{more}"
 
 
@@ -327,5 +327,5 @@ def _place_beside(a: Recording, b: Recording) -> np.ndarray:
 
 
 def _largest_id(run: Recording) -> int:
-    """Of all who were ever there: those at the beginning, and those whose birth is an event."""
+    """Largest id of all entities of a run: of the first frame, and of births among the events."""
     return max(int(run.frame(0).id.max(initial=0)), max((h.id for h in run.events), default=0))

@@ -15,7 +15,7 @@ from tussle.view.page.packing import ints
 from tussle.view.scenery import Scenery
 from tussle.view.shapes import MODELS, Mesh
 from tussle.view.sight import Sight, range_of
-from tussle.view.solids import MOST_FACES
+from tussle.view.solids import MAX_FACES
 from tussle.view.style import Style
 from tussle.view.terrain import Terrain
 from tussle.world.rays.surfaces import MeshPart
@@ -23,7 +23,7 @@ from tussle.world.rays.textures import jpeg
 
 FORMAT = 2
 """Version of the document and of the chunks, for programs that read them from a file."""
-MOST_HEIGHTS = 250_000
+MAX_HEIGHTS = 250_000
 """Heights of the terrain on the page: with some half a million triangles a browser still draws without effort."""
 HEIGHT_STEPS = 65_535
 
@@ -195,7 +195,7 @@ def scenery_data(scenery: Scenery) -> dict[str, Any]:
             }
             for r in scenery.boundaries
         ],
-        "terrain": scenery.terrain and _terrain_data(scenery.terrain.thinned(MOST_HEIGHTS)),
+        "terrain": scenery.terrain and _terrain_data(scenery.terrain.thinned(MAX_HEIGHTS)),
     }
 
 
@@ -234,7 +234,7 @@ def _part_bytes(part: MeshPart, middle: np.ndarray) -> bytes:
     The head is the numbers of corners and of triangles and whether there is an image, uint32; a corner is its place from the middle [m],
     uv and colour, float32; triangles are uint32.
     """
-    faces = part.faces[:MOST_FACES]
+    faces = part.faces[:MAX_FACES]
     uv = np.zeros((len(part.vertices), 2)) if part.uv is None else part.uv
     corners = np.hstack([part.vertices - middle, uv, part.colours / 255.0])
     head = np.array([len(corners), len(faces), part.image is not None], "<u4")
@@ -243,7 +243,7 @@ def _part_bytes(part: MeshPart, middle: np.ndarray) -> bytes:
 
 def _height_bytes(terrain: Terrain) -> bytes:
     """Heights in steps above the lowest, row by row as differences to the point before."""
-    height = terrain.thinned(MOST_HEIGHTS).height
+    height = terrain.thinned(MAX_HEIGHTS).height
     low, high = float(height.min()), float(height.max())
     steps = np.rint((height - low) * (HEIGHT_STEPS / (high - low) if high > low else 0.0)).astype(np.int64)
     return ints(np.diff(steps.ravel(), prepend=np.int64(0)))
@@ -252,12 +252,12 @@ def _height_bytes(terrain: Terrain) -> bytes:
 def terrain_note(scenery: Scenery) -> str:
     """Return a note on the part of the terrain that is not shown, or ""."""
     terrain = scenery.terrain
-    thin = None if terrain is None else terrain.thinned(MOST_HEIGHTS)
+    thin = None if terrain is None else terrain.thinned(MAX_HEIGHTS)
     if terrain is None or thin is None or thin.height.size == terrain.height.size:
         return ""
     return f"the terrain has {_size(terrain)} heights; {_size(thin)} are shown"
 
 
 def _size(terrain: Terrain) -> str:
-    """Such as "300 x 200"."""
+    """Write a size: "300 x 200"."""
     return f"{len(terrain.x)} x {len(terrain.y)}"

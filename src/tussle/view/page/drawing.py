@@ -27,7 +27,7 @@ ATTRIBUTES: Mapping[str, tuple[str, ...]] = {
 
 DRAWN = (230, 60, 160)
 """Colour of what is drawn without one: none of the teams'."""
-MOST_TEXTS, MOST_MESHES = 100, 50
+MAX_TEXTS, MAX_MESHES = 100, 50
 
 # Five colours of viridis (N. Smith and S. van der Walt, 2015, CC0): even steps of lightness, also without colour.
 SCALE = np.array([(68, 1, 84), (59, 82, 139), (33, 145, 140), (94, 201, 98), (253, 231, 37)], float)
@@ -78,7 +78,7 @@ def drawing_message(shapes: tuple[Shape, ...]) -> tuple[dict[str, Any], bytes, l
     part each, has place, attitude, colour and opacity (11), then its vertices and the numbers of its faces' corners.
     """
     drawing = read_drawing(shapes)
-    meshes = drawing.rows.pop("mesh", [])[:MOST_MESHES]
+    meshes = drawing.rows.pop("mesh", [])[:MAX_MESHES]
     found: list[tuple[str, np.ndarray, dict[str, int]]]
     found = [(kind, np.concatenate(rows), {}) for kind, rows in drawing.rows.items()]
     found += [
@@ -91,7 +91,7 @@ def drawing_message(shapes: tuple[Shape, ...]) -> tuple[dict[str, Any], bytes, l
         if len(rows):
             parts.append({"kind": kind, "n": len(rows), "at": len(data) // 4, **more})
             data += np.ascontiguousarray(rows, "<f4").tobytes()
-    return {"parts": parts, "width": drawing.width, "texts": drawing.texts[:MOST_TEXTS]}, data, drawing.notes
+    return {"parts": parts, "width": drawing.width, "texts": drawing.texts[:MAX_TEXTS]}, data, drawing.notes
 
 
 def _read(shape: Shape, drawing: Drawing) -> None:

@@ -9,10 +9,10 @@ from typing import Any
 from tussle.declare.displays import counted, shortened
 from tussle.record.event_texts import end_text
 
-MOST_BLOCKS = 20
+MAX_BLOCKS = 20
 """Blocks that are listed."""
-MOST_LETTERS = 400
-"""Of the plugins of a block."""
+MAX_LENGTH = 400
+"""Largest number of characters in the list of a block's plugins."""
 Fact = tuple[str, str]
 
 
@@ -30,16 +30,16 @@ def mission_facts(mission: Mapping[str, Any], teams: Mapping[int, str]) -> list[
     for team, name in teams.items():
         n = sum(block.get("count") or 0 for block in blocks if block["team"] == team)
         facts.append((f"Team {team}", f"{name}: {counted(n, 'entity', 'entities')}" if n else name))
-    facts += [(f"Plugins of {block['name']}", _plugins(block["plugins"])) for block in blocks[:MOST_BLOCKS]]
-    if len(blocks) > MOST_BLOCKS:
-        facts.append(("Plugins", f"of {counted(len(blocks) - MOST_BLOCKS, 'more block')} are not listed"))
+    facts += [(f"Plugins of {block['name']}", _plugins(block["plugins"])) for block in blocks[:MAX_BLOCKS]]
+    if len(blocks) > MAX_BLOCKS:
+        facts.append(("Plugins", f"of {counted(len(blocks) - MAX_BLOCKS, 'more block')} are not listed"))
     if world := mission.get("world_plugins"):
         facts.append(("Plugins of the world", _plugins(world)))
     return facts
 
 
 def _plugins(texts: Iterable[str]) -> str:
-    return shortened(", ".join(text.partition("(")[0] for text in texts), MOST_LETTERS)
+    return shortened(", ".join(text.partition("(")[0] for text in texts), MAX_LENGTH)
 
 
 def _end(mission: Mapping[str, Any]) -> str:

@@ -9,9 +9,9 @@ from pathlib import Path
 
 from tussle.errors import TussleError
 
-MOST_FAILURES = 20
+MAX_FAILURES = 20
 """Largest number of listed failures."""
-LONGEST = 300
+MAX_TEXT = 300
 """Characters of one."""
 
 
@@ -31,8 +31,8 @@ class Failures:
         """Add an error to the list and return its line."""
         self.last = error
         text = _in_words(error)
-        if text not in self.texts and len(self.texts) <= MOST_FAILURES:
-            is_full = len(self.texts) == MOST_FAILURES
+        if text not in self.texts and len(self.texts) <= MAX_FAILURES:
+            is_full = len(self.texts) == MAX_FAILURES
             self.texts.append("further errors of the page are not listed" if is_full else text)
         return text
 
@@ -50,5 +50,5 @@ def _in_words(error: BaseException) -> str:
     if not isinstance(error, TussleError):
         places = traceback.extract_tb(error.__traceback__)
         where = f" ({Path(places[-1].filename).name}:{places[-1].lineno})" if places else ""
-        text = f"the page: {type(error).__name__}: {text[: LONGEST - 100]}{where}"
-    return text[:LONGEST]
+        text = f"the page: {type(error).__name__}: {text[: MAX_TEXT - 100]}{where}"
+    return text[:MAX_TEXT]

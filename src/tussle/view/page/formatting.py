@@ -12,9 +12,9 @@ from tussle.declare.units import split_units, unit_of
 from tussle.engine.result import WorldResult
 from tussle.view.entity import EntityState, Reading, ShownMessage
 
-MOST_ITEMS = 6
-"""Of a list, in a reading or a message."""
-MOST_LETTERS = 8
+MAX_ITEMS = 6
+"""Largest number of items of a list that are shown."""
+MAX_MESSAGES = 8
 NARROW = "\N{NO-BREAK SPACE}"
 """Keeps a number with its name and its unit on one line."""
 MINUS = "\N{MINUS SIGN}"
@@ -30,10 +30,10 @@ def number(value: Any) -> str:
     if isinstance(value, (float, np.floating)):
         return displays.number(float(value), 4).replace("-", MINUS)
     if isinstance(value, np.ndarray) and value.ndim == 1:
-        more = "" if len(value) <= MOST_ITEMS else f" … ({len(value)})"
-        return "  ".join(map(number, value[:MOST_ITEMS])) + more
+        more = "" if len(value) <= MAX_ITEMS else f" … ({len(value)})"
+        return "  ".join(map(number, value[:MAX_ITEMS])) + more
     if isinstance(value, np.ndarray):
-        rows = ";  ".join(number(row) for row in value[:MOST_ITEMS])
+        rows = ";  ".join(number(row) for row in value[:MAX_ITEMS])
         return f"{displays.counted(len(value), 'row')}: {rows}" if len(value) else "–"
     return str(value)
 
@@ -65,11 +65,11 @@ def entity_sections(state: EntityState) -> list[tuple[str, list[Row]]]:
     """Return titles and rows of an entity: body, columns of plugins, what they do before their parameters, and messages."""
     body = [(key, reading(r)) for key, r in state.body.items() if key not in ("force", "torque")]
     plugins = [(name, _column_rows(columns)) for name, columns in state.plugins.items()]
-    letters = [
-        (title, [_letter(letter) for letter in said[-MOST_LETTERS:]])
-        for title, said in (("heard", state.heard), ("said", state.said))
+    messages = [
+        (title, [_message_row(message) for message in found[-MAX_MESSAGES:]])
+        for title, found in (("received", state.received), ("sent", state.sent))
     ]
-    return [("", body), *(section for section in (*plugins, *letters) if section[1])]
+    return [("", body), *(section for section in (*plugins, *messages) if section[1])]
 
 
 def _column_rows(columns: Mapping[str, Reading]) -> list[Row]:
@@ -100,9 +100,7 @@ def reading(value: Reading) -> str:
     parts = [
         f"{name}{number(v)}{'' if is_alike else s}" for name, v, s in zip(named, numbers, signs, strict=True)
     ]
-    return (
-        "  ".join(parts[:MOST_ITEMS]) + (f" … ({n})" if n > MOST_ITEMS else "") + (unit if is_alike else "")
-    )
+    return "  ".join(parts[:MAX_ITEMS]) + (f" … ({n})" if n > MAX_ITEMS else "") + (unit if is_alike else "")
 
 
 def _sign(unit: str) -> str:
@@ -123,6 +121,6 @@ def _component_names(fields: Sequence[str]) -> list[str]:
     return [tail if is_common else name for name, (_, _, tail) in zip(fields, parts, strict=True)]
 
 
-def _letter(letter: ShownMessage) -> Row:
-    fields = "; ".join(f"{name} {number(value)}" for name, value in letter.fields.items())
-    return letter.topic, f"{letter.sender or 'world'}: {fields}"
+def _message_row(message: ShownMessage) -> Row:
+    fields = "; ".join(f"{name} {number(value)}" for name, value in message.fields.items())
+    return message.topic, f"{message.sender or 'world'}: {fields}"

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-MOST = 2**28
+MAX_VALUE = 2**28
 """Largest number that a column takes: its second differences then fit 31 bits."""
 
 
@@ -35,7 +35,7 @@ def column(values: np.ndarray, is_head: np.ndarray) -> bytes:
     first number of each series, and `ints` of all that follow, series by series. The first difference of a series counts as one to 0.
 
     Args:
-        values: Series after series, within ±MOST, (n,).
+        values: Series after series, within ±MAX_VALUE, (n,).
         is_head: Where one begins, (n,).
     """
     values = np.asarray(values, np.int64)

@@ -12,13 +12,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from tussle.documents import Real
 from tussle.errors import ParameterError
+from tussle.pacing import POLL_PERIOD
 from tussle.record.run_file import mission_entry
 from tussle.view.curves import numbers_of
 from tussle.view.frame import Event, Frame
 from tussle.view.live import Live
 from tussle.view.page.chunks import FULL_HEALTH, UNIT, pack, step_of
-from tussle.view.page.commands import LARGEST_ID, WANTED, Command, game_commands, number, read_command, whole
+from tussle.view.page.commands import ID, MAX_ID, WANTED, Command, game_commands, read_command
 from tussle.view.page.document import event_rows
 from tussle.view.page.drawing import drawing_message
 from tussle.view.page.facts import mission_facts
@@ -33,20 +35,18 @@ if TYPE_CHECKING:
 PERIOD = 1.0 / 30.0
 """Least time between two frames [s]."""
 STATUS_PERIOD = 0.25
-"""Time between two readings of what nobody reads faster: numbers, notes, events, the chosen entity [s]."""
-NAP = 0.1
-"""While nobody watches [s]."""
-MOST_MESSAGES = 200
-"""From one browser in a second, and at once. More wait."""
-MOST_EVENTS = 2000
-"""Of one message."""
-MOST_CHANGES = 5000
-"""Of one message; those of one quantity are sent together, at most as many as are kept."""
+"""Period at which numbers, notes, events and the chosen entity are sent [s]."""
+MAX_MESSAGES = 200
+"""Largest number of messages per second that are read from one browser; further ones wait."""
+MAX_EVENTS = 2000
+"""Largest number of events in one message."""
+MAX_CHANGES = 5000
+"""Number of changes at which a message is full; those of one quantity are sent together."""
 REFUSAL_PERIOD = 1.0
 """Least time between two messages about refused values [s]."""
 PAST_FRAMES, PAST_STATES = 120, 60_000
-"""Of a look back, at most."""
-MOST_LOOKS = 4
+"""Limits of the history that a browser asks for: frames, and states of entities in them."""
+MAX_LOOKS = 4
 """Back, that wait to be sent to a browser."""
 
 
@@ -66,7 +66,7 @@ class Reader:
         self.wake.set()
         self.frame_sent = self.drawn_sent = 0
         self.status_due = 0.0
-        self.past: deque[bytes] = deque(maxlen=MOST_LOOKS)
+        self.past: deque[bytes] = deque(maxlen=MAX_LOOKS)
         self.refusal: str | None = None
         self.refused_at = -REFUSAL_PERIOD
         self.events_sent: list[Event] = []
@@ -116,7 +116,7 @@ class FramePublisher:
         return {
             "source": "socket", "facts": facts, "endTime": mission.end if self._ends_by_time else None, "dt": mission.dt,
             "idShift": 0, "isComplete": True, "attitudeUnit": UNIT,
-            "healthSteps": FULL_HEALTH, "seed": min(self._live.seed, LARGEST_ID),
+            "healthSteps": FULL_HEALTH, "seed": min(self._live.seed, MAX_ID),
         }  # fmt: skip
 
     @property
@@ -140,7 +140,7 @@ class FramePublisher:
                     self._make_drawing()
                 for reader in self.readers:
                     reader.wake.set()
-            await asyncio.sleep(self._period if self.readers else NAP)
+            await asyncio.sleep(self._period if self.readers else POLL_PERIOD)
 
     def _make_frame(self) -> None:
         frame, epoch = self._live.frame(), self._live.epoch
@@ -172,7 +172,7 @@ class FramePublisher:
         try:
             while not socket.closed:
                 now = time.monotonic()
-                reader.free_at = max(reader.free_at, now - 1.0) + 1.0 / MOST_MESSAGES
+                reader.free_at = max(reader.free_at, now - 1.0) + 1.0 / MAX_MESSAGES
                 await asyncio.sleep(max(0.0, reader.free_at - now))
                 received = await socket.receive()
                 if received.data is None or socket.closed:
@@ -233,7 +233,7 @@ class FramePublisher:
         n = len(sent)
         if n > len(events) or (n and events[n - 1] is not sent[-1]):
             n = 0
-        new = events[n : n + MOST_EVENTS]
+        new = events[n : n + MAX_EVENTS]
         reader.events_sent = events[: n + len(new)]
         return {"from": n, "rows": event_rows(new)}
 
@@ -249,7 +249,7 @@ class FramePublisher:
                 continue
             sent, n_sent = reader.changes_sent.get(quantity, (None, 0))
             start, end = n_sent if sent is each else 0, len(each.values)
-            if (start == end and sent is each) or sum(len(c.t) for c in changes) > MOST_CHANGES:
+            if (start == end and sent is each) or sum(len(c.t) for c in changes) > MAX_CHANGES:
                 continue
             reader.changes_sent[quantity] = each, end
             t = [self._live.time_of(step) for step in each.steps[start:end]]
@@ -288,10 +288,10 @@ class FramePublisher:
     def _take(self, reader: Reader, text: Any) -> None:
         """Execute the command of a browser; ignore invalid ones."""
         commands = self._commands | {
-            "choose": Command(reader.choose, {"id": whole(0, LARGEST_ID)}, steers=False),
+            "choose": Command(reader.choose, {"id": ID}, steers=False),
             "want": Command(lambda wanted: self._want(reader, wanted), {"wanted": WANTED}, steers=False),
             "history": Command(
-                lambda seconds: self._look_back(reader, seconds), {"seconds": number(0.0, 1e9)}, steers=False
+                lambda seconds: self._look_back(reader, seconds), {"seconds": Real(0.0, 1e9)}, steers=False
             ),
         }
         with self._failures.caught():

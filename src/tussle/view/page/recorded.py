@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import struct
 from collections.abc import Sequence
 from functools import cached_property
@@ -12,7 +11,8 @@ from typing import Any
 import numpy as np
 
 from tussle.declare import displays
-from tussle.errors import ParameterError, ViewError
+from tussle.documents import POSITIVE, Maybe, check_argument
+from tussle.errors import ViewError
 from tussle.mission import Mission
 from tussle.view.page.chunks import ANGLE_ERROR, FULL_HEALTH, UNIT, pack, position_error, step_of
 from tussle.view.page.compare import Comparison
@@ -26,8 +26,8 @@ from tussle.view.recording import Recording
 FILE_STATES, FILE_FRAMES = 150_000, 32
 """States of a chunk in a file, about, and its least frames: with fewer the first states of its tracks weigh too much."""
 SERVED_STATES, SERVED_FRAMES = 20_000, 4
-"""Of a chunk that is served: some hundredths of a second of work for both ends, so that a jump in time is not felt."""
-MOST_FRAMES = 1024
+"""Largest numbers of states and frames in a chunk: work of some hundredths of a second for both ends, so that seeking is not felt."""
+MAX_FRAMES = 1024
 """Frames of a chunk: with more a page has to read too much before it shows anything."""
 SHAPE_FRAMES = 64
 """Frames whose shapes are read at once."""
@@ -65,8 +65,7 @@ class RecordedData:
         mission: Mission | None = None,
         viewer: dict[str, Any] | None = None,
     ) -> None:
-        if period is not None and not 0.0 < period < math.inf:
-            raise ParameterError(f"period = {period!r} is not allowed; it takes a number of seconds > 0")
+        check_argument("period", period, Maybe(POSITIVE))
         self._game, self._period, self._is_file = game, period, is_file
         self.kept = kept_frames(game.t, period)
         if not len(self.kept):
@@ -266,14 +265,14 @@ def chunk_bounds(counts: np.ndarray, n_states: int, least_frames: int) -> list[t
     Args:
         counts: States of each frame, (F,), F > 0.
         n_states: States of a chunk.
-        least_frames: Frames that it has at least, at most being `MOST_FRAMES`.
+        least_frames: Frames that it has at least, at most being `MAX_FRAMES`.
     """
     total, last = np.cumsum(counts), len(counts) - 1
     bounds: list[tuple[int, int]] = []
     first = 0
     while first < last or not bounds:
         full = int(np.searchsorted(total, total[first] - counts[first] + n_states))
-        end = min(max(full, first + max(least_frames, 2) - 1), first + MOST_FRAMES - 1, last)
+        end = min(max(full, first + max(least_frames, 2) - 1), first + MAX_FRAMES - 1, last)
         bounds.append((first, end))
         first = end
     return bounds

@@ -15,7 +15,7 @@ COLUMNS = {
     "health": "",
 }  # fmt: skip
 """Columns of a recorded entity, and their units."""
-MOST_POINTS = 20_000
+MAX_POINTS = 20_000
 """Frames of a recording from which a column is read; of more, every other one, every third, …"""
 
 
@@ -90,7 +90,7 @@ def column_changes(run: Recording, who: int, name: str, id_shift: int = 0) -> Ch
         name: One of `quantities_of` the run.
         id_shift: What is added to its id.
     """
-    frames = np.arange(0, run.n_frames, -(-run.n_frames // MOST_POINTS))
+    frames = np.arange(0, run.n_frames, -(-run.n_frames // MAX_POINTS))
     rows = np.array([run.row_of(i, who) for i in frames.tolist()])
     values = _values(run, rows, name)
     is_new = np.append(True, ~((values[1:] == values[:-1]) | (np.isnan(values[1:]) & np.isnan(values[:-1]))))

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Self
 from tussle.errors import MissingExtraError
 from tussle.mission import Mission
 from tussle.view.live import Live
-from tussle.view.page.access import HEADERS, MOST_BROWSERS, MOST_BYTES, MOST_UNSENT, Access, bound_socket
+from tussle.view.page.access import HEADERS, MAX_BROWSERS, MAX_BYTES, MAX_UNSENT, Access, bound_socket
 from tussle.view.page.assemble import page_html
 from tussle.view.page.compare import Comparison
 from tussle.view.page.document import game_document, scenery_blobs
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from aiohttp import web
 
 LOOPBACK = "127.0.0.1"
-MOST_PERIOD = 60.0
+MAX_PERIOD = 60.0
 """Between two frames [s]: longer is no moving picture."""
 
 
@@ -127,10 +127,10 @@ class Page:
 
         name = request.path.strip("/").partition("/")[2]
         if not name and "Upgrade" in request.headers and self.publisher is not None:
-            if len(self.publisher.readers) >= MOST_BROWSERS:
-                return web.Response(status=403, text=f"{MOST_BROWSERS} browsers watch already.\n")
+            if len(self.publisher.readers) >= MAX_BROWSERS:
+                return web.Response(status=403, text=f"{MAX_BROWSERS} browsers watch already.\n")
             socket = web.WebSocketResponse(
-                max_msg_size=MOST_BYTES, compress=False, timeout=1.0, writer_limit=MOST_UNSENT
+                max_msg_size=MAX_BYTES, compress=False, timeout=1.0, writer_limit=MAX_UNSENT
             )
             await socket.prepare(request)
             await self.publisher.serve(socket)
@@ -206,7 +206,7 @@ def _period(viewer: Mapping[str, Any], notes: list[str]) -> float:
         period = 0.0 if text is None else 1e-3 * float(text)
     except ValueError:
         period = -1.0
-    if not 0.0 <= period < MOST_PERIOD:
+    if not 0.0 <= period < MAX_PERIOD:
         notes.append(f"gui_update_period {text!r} is no time in ms; frames are sent as fast as can be")
         return 0.0
     return period

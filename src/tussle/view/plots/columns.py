@@ -14,7 +14,7 @@ from tussle.errors import ParameterError, ViewError, listed, nearest_name
 from tussle.palette import INK
 from tussle.palette import TEAM_COLOURS as COLOURS
 from tussle.record.schema import FLOAT_COLUMNS
-from tussle.view.plots.curves import MOST_TIMES, band_signs, draw_bands, over_time
+from tussle.view.plots.curves import MAX_TIMES, band_signs, draw_bands, over_time
 from tussle.view.plots.selection import Selection, Trajectories
 from tussle.view.plots.sheet import DASHES, Handle, add_head, line_look, line_sign, sheet, time_axis
 from tussle.view.recording import Recording
@@ -112,7 +112,7 @@ def column_of_runs(recordings: Sequence[Recording], name: str, selection: Select
     labels = parts_of(recordings[0], name)
     games = [_with_values(recording, name, labels, selection or Selection()) for recording in recordings]
     teams = {team: text for tracks in games for team, text in tracks.teams.items()}
-    t = np.linspace(min(g.frame_times[0] for g in games), max(g.frame_times[-1] for g in games), MOST_TIMES)
+    t = np.linspace(min(g.frame_times[0] for g in games), max(g.frame_times[-1] for g in games), MAX_TIMES)
     figure = sheet(2.5 * len(labels))
     signs: list[Handle] = []
     for axes, (part, label) in zip(

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-MOST_MARKS = 80
+MAX_MARKS = 80
 """Deaths of a team up to which each is marked."""
 CAUSE_MARKS = ("x", "+", "d", "1")
 """Markers of causes of death in alphabetical order; the last one stands for all further causes."""
@@ -128,7 +128,7 @@ def _mark_deaths(axes: Axes, tracks: Trajectories, team: int, n: np.ndarray) -> 
     """
     of_team = set(tracks.who[tracks.team == team].tolist())
     deaths = [h for who, h in tracks.deaths.items() if who in of_team]
-    if len(deaths) > MOST_MARKS:
+    if len(deaths) > MAX_MARKS:
         return set()
     causes = _causes(tracks)
     for h in deaths:

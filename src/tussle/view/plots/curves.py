@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 MANY = 12
 """Largest team with a line for each entity; larger teams get a band."""
-MOST_TIMES = 400
+MAX_TIMES = 400
 """Points of a band."""
 
 
@@ -162,7 +162,7 @@ def _death_sign(tracks: Trajectories) -> list[Handle]:
 
 def _band(axes: Axes, tracks: Trajectories, values: np.ndarray, team: int) -> None:
     """Median, middle half and middle nine tenths of a team over time."""
-    frames = np.unique(np.linspace(0, len(tracks.frame_times) - 1, MOST_TIMES).round().astype(int))
+    frames = np.unique(np.linspace(0, len(tracks.frame_times) - 1, MAX_TIMES).round().astype(int))
     mine = np.repeat(tracks.team == team, np.diff(tracks.first)) & np.isin(tracks.frame, frames)
     order = np.argsort(tracks.frame[mine], kind="stable")
     frame, found = tracks.frame[mine][order], values[mine][order]

@@ -30,7 +30,7 @@ _ZOOM = 1.08
 """Size of a flat scene in space."""
 MAX_SIGNS = 4
 """Marks of teams beside each other in a legend."""
-LEAST_WIDTH = 10.0
+MIN_WIDTH = 10.0
 """Least width of a map [m]."""
 
 
@@ -55,7 +55,7 @@ def trajectory3d(tracks: Trajectories) -> Figure:
     shown = tracks.spread(MAX_TRAJECTORIES)
     pos = tracks.pos()
     low, high = pos.min(axis=0), pos.max(axis=0)
-    missing = np.maximum(0.0, np.array([LEAST_WIDTH, LEAST_WIDTH, 1.0]) - (high - low))
+    missing = np.maximum(0.0, np.array([MIN_WIDTH, MIN_WIDTH, 1.0]) - (high - low))
     low, high = low - 0.5 * missing, high + 0.5 * missing
     size = high - low
     times = max(1.0, round_up(0.2 * float(size[:2].max()) / float(size[2])))
@@ -222,7 +222,7 @@ def _draw_ends(axes: Any, tracks: Trajectories, pos: np.ndarray, shown: np.ndarr
 
 def _framed(low: np.ndarray, high: np.ndarray, room: float = 0.75) -> tuple[np.ndarray, np.ndarray, float]:
     """Corners of a map around others, each (2,), and the height of its figure [inch], so that both axes have one scale."""
-    size = np.maximum(high - low, LEAST_WIDTH)
+    size = np.maximum(high - low, MIN_WIDTH)
     size = 1.08 * np.maximum(size, 0.02 * size.max())
     width = WIDTH - room
     height = float(np.clip(width * size[1] / size[0], 1.5, 4.6))

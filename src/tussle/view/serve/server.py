@@ -12,10 +12,12 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any, Self, TypeVar
 
+from tussle.documents import Whole, check_argument
 from tussle.engine.simulation import Simulation
 from tussle.errors import MissingExtraError, ParameterError, TussleError, listed, nearest_name
-from tussle.view.pacing import Pace, checked_warp
-from tussle.view.page.access import MOST_BROWSERS, Access, bound_socket
+from tussle.pacing import Pace
+from tussle.view.pacing import checked_warp
+from tussle.view.page.access import MAX_BROWSERS, Access, bound_socket
 from tussle.view.page.web_server import WebServer
 from tussle.view.serve.session import ENCODINGS, Session, encoded
 
@@ -24,14 +26,15 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
-MOST_BYTES = 64 * 1024 * 1024
-"""Of one message from a client."""
-MOST_WAITING = 64
-"""Messages that wait until a client takes them; further states are dropped."""
-MOST_SUBSCRIPTIONS = 64
-"""Of one client."""
+MAX_BYTES = 64 * 1024 * 1024
+"""Largest size of a message from a client [B]."""
+MAX_WAITING = 64
+"""Length of a client's queue of messages; further states are dropped."""
+MAX_SUBSCRIPTIONS = 64
+"""Largest number of subscriptions of a client."""
 SLICE = 0.05
-"""Time for which steps are made before other commands are executed [s]."""
+"""Longest run of steps before other commands are executed [s]."""
+COUNT = Whole(1, 10**9)
 OWN_COMMANDS = ("pause", "play", "step", "subscribe", "unsubscribe")
 
 
@@ -55,7 +58,7 @@ class Client:
     def __init__(self, socket: web.WebSocketResponse) -> None:
         self.socket = socket
         self.subscriptions: dict[int, Subscription] = {}
-        self.waiting: asyncio.Queue[str] = asyncio.Queue(MOST_WAITING)
+        self.waiting: asyncio.Queue[str] = asyncio.Queue(MAX_WAITING)
         self.n_dropped = 0
 
     def offer(self, state: dict[str, Any]) -> None:
@@ -134,13 +137,13 @@ class Server:
         )
         if not reason and "Origin" in headers:
             reason = "This is not open to pages.\n"
-        if not reason and len(self._clients) >= MOST_BROWSERS:
-            reason = f"{MOST_BROWSERS} programs are connected already.\n"
+        if not reason and len(self._clients) >= MAX_BROWSERS:
+            reason = f"{MAX_BROWSERS} programs are connected already.\n"
         if reason:
             return web.Response(status=403, text=reason)
         if "Upgrade" not in headers:
             return web.Response(status=426, text=f"Connect a websocket to {self.url}\n")
-        socket = web.WebSocketResponse(max_msg_size=MOST_BYTES, compress=False, timeout=1.0)
+        socket = web.WebSocketResponse(max_msg_size=MAX_BYTES, compress=False, timeout=1.0)
         await socket.prepare(request)
         client = Client(socket)
         self._clients.append(client)
@@ -216,11 +219,11 @@ class Server:
 
     def _subscribe(self, client: Client, paths: Any, every: int, encoding: str) -> dict[str, Any]:
         wanted = (paths,) if isinstance(paths, str) else tuple(paths)
-        if not wanted or len(client.subscriptions) >= MOST_SUBSCRIPTIONS:
+        if not wanted or len(client.subscriptions) >= MAX_SUBSCRIPTIONS:
             raise ParameterError(
-                f"a client has 1 to {MOST_SUBSCRIPTIONS} subscriptions, each of at least one path"
+                f"a client has 1 to {MAX_SUBSCRIPTIONS} subscriptions, each of at least one path"
             )
-        _check_count("every", every)
+        check_argument("every", every, COUNT)
         if encoding not in ENCODINGS:
             raise ParameterError(f"encoding = {encoding!r} is not allowed; {listed(ENCODINGS)}")
         for path in wanted:
@@ -232,7 +235,7 @@ class Server:
     # -- steps ------------------------------------------------------------------------------------------------------------------------
 
     async def _step(self, n: int) -> dict[str, Any]:
-        _check_count("n", n)
+        check_argument("n", n, COUNT)
         while n > 0 and not self._simulation.is_over:
             n -= await self._turned(partial(self._advance, n))
         return self._session.now()
@@ -281,13 +284,6 @@ class Server:
                     client.offer({"error": str(error)})
             if simulation.is_over:
                 self._can_play.clear()
-
-
-def _check_count(name: str, value: Any) -> None:
-    if type(value) is not int or not 1 <= value <= 10**9:
-        raise ParameterError(
-            f"{name} = {value!r} is not allowed; it takes a whole number from 1 to 1000000000"
-        )
 
 
 def _known(command: str, fields: Mapping[str, Any], **defaults: Any) -> dict[str, Any]:

@@ -15,7 +15,7 @@ from tussle.engine.simulation import Simulation
 from tussle.engine.snapshot import Snapshot
 from tussle.errors import ParameterError, TussleError, listed, nearest_name
 
-MOST_SNAPSHOTS = 16
+MAX_SNAPSHOTS = 16
 """Kept at once; the oldest is dropped for another."""
 ENCODINGS = ("list", "base64")
 
@@ -117,7 +117,7 @@ class Session:
         """Keep the whole state."""
         self._n_snapshots += 1
         self._snapshots[self._n_snapshots] = self._simulation.snapshot()
-        if len(self._snapshots) > MOST_SNAPSHOTS:
+        if len(self._snapshots) > MAX_SNAPSHOTS:
             del self._snapshots[min(self._snapshots)]
         return {"snapshot": self._n_snapshots}
 

@@ -39,7 +39,7 @@ class ContactList:
 
     @property
     def arrays(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """For kernels."""
+        """Return the arrays as kernels take them."""
         return self.row, self.other, self.numbers
 
 

@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 
 from tussle.documents import read_bytes
-from tussle.errors import MissingExtraError, ParameterError, listed, nearest_name
+from tussle.errors import MissingExtraError, ParameterError, clipped, listed, nearest_name
 from tussle.world.rays.grids import read_ascii_grid, read_image
-from tussle.world.rays.surfaces import MOST_FACES, HeightField, TriangleMesh
+from tussle.world.rays.surfaces import MAX_FACES, HeightField, TriangleMesh
 from tussle.world.rays.textures import decoded
 from tussle.world.rays.vtk import read_vtk
 
-MOST_BYTES = 64_000_000
+MAX_BYTES = 64_000_000
 IMAGES = (".png", ".tif", ".tiff")
 BY_TRIMESH = (".obj", ".ply", ".stl", ".glb", ".gltf", ".off")
 MESHES = (".vtk", *BY_TRIMESH)
@@ -81,12 +81,12 @@ def read_texture(path: Path | str) -> np.ndarray:
 
 
 def bytes_of(path: Path) -> bytes:
-    """Content of a regular file of at most `MOST_BYTES`.
+    """Content of a regular file of at most `MAX_BYTES`.
 
     Raises:
         ParameterError: It is no such file.
     """
-    return read_bytes(path, ParameterError, MOST_BYTES)
+    return read_bytes(path, ParameterError, MAX_BYTES)
 
 
 def corners(vertices: Any) -> np.ndarray:
@@ -136,8 +136,8 @@ def _by_trimesh(path: Path, data: bytes) -> tuple[np.ndarray, np.ndarray]:
         raise MissingExtraError(f"{path}: meshes need trimesh: pip install 'tussle[scene]'") from None
     suffix = path.suffix.lower()
     try:
-        if _announced(suffix, data) > 3 * MOST_FACES:
-            raise ParameterError(f"{path}: the mesh announces more than {MOST_FACES:,} triangles")
+        if _announced(suffix, data) > 3 * MAX_FACES:
+            raise ParameterError(f"{path}: the mesh announces more than {MAX_FACES:,} triangles")
         # Without a path and a resolver, the file cannot make trimesh read other files.
         made: Any = trimesh.load(
             io.BytesIO(data), file_type=suffix[1:], force="mesh", process=False, skip_materials=True
@@ -147,5 +147,5 @@ def _by_trimesh(path: Path, data: bytes) -> tuple[np.ndarray, np.ndarray]:
         raise
     except Exception as error:
         raise ParameterError(
-            f"{path}: it cannot be read as {suffix}: {type(error).__name__}: {str(error)[:200]}"
+            f"{path}: it cannot be read as {suffix}: {type(error).__name__}: {clipped(str(error), 200)}"
         ) from error

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from tussle.errors import MissingExtraError, ParameterError, listed, nearest_name
-from tussle.world.rays.surfaces import MOST_HEIGHTS, HeightField
+from tussle.errors import MissingExtraError, ParameterError, clipped, listed, nearest_name
+from tussle.world.rays.surfaces import MAX_HEIGHTS, HeightField
 
 KEYS = ("ncols", "nrows", "xllcorner", "yllcorner", "xllcenter", "yllcenter", "cellsize", "nodata_value")
 NEEDED = ("ncols", "nrows", "cellsize")
@@ -60,7 +60,7 @@ def _read_head(path: Path, lines: list[str]) -> tuple[dict[str, float], int]:
         key = words[0].lower()
         if key not in KEYS:
             raise ParameterError(
-                f"{path}:{number}: a terrain has no {words[0][:40]!r}{nearest_name(key, KEYS)}; {listed(KEYS)}"
+                f"{path}:{number}: a terrain has no {clipped(words[0])!r}{nearest_name(key, KEYS)}; {listed(KEYS)}"
             )
         try:
             (head[key],) = (float(word) for word in words[1:])
@@ -73,9 +73,9 @@ def _read_head(path: Path, lines: list[str]) -> tuple[dict[str, float], int]:
 
 
 def _check_size(path: Path, nx: int, ny: int, cell: float) -> None:
-    if nx < 2 or ny < 2 or nx * ny > MOST_HEIGHTS or not 0.0 < cell < float("inf"):
+    if nx < 2 or ny < 2 or nx * ny > MAX_HEIGHTS or not 0.0 < cell < float("inf"):
         raise ParameterError(
-            f"{path}: a terrain of {nx} x {ny} heights every {cell:g} m is not allowed; it takes 2 x 2 to {MOST_HEIGHTS} heights"
+            f"{path}: a terrain of {nx} x {ny} heights every {cell:g} m is not allowed; it takes 2 x 2 to {MAX_HEIGHTS} heights"
         )
 
 

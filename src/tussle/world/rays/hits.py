@@ -10,7 +10,7 @@ import numpy as np
 from tussle.errors import ParameterError
 from tussle.numeric.arrays import unit
 
-FARTHEST_RAY = 1e200
+MAX_RAY = 1e200
 """Range without a limit [m], for kernels: finite, so that no difference is NaN."""
 
 
@@ -93,7 +93,7 @@ def new_rays(
             f"there are {start.shape[1]} origins and {way.shape[1]} directions; their numbers must be equal"
         )
     n = start.shape[1]
-    limit = np.minimum(checked_numbers("max_range", max_range, n), FARTHEST_RAY)
+    limit = np.minimum(checked_numbers("max_range", max_range, n), MAX_RAY)
     way = unit(way)
     limit[(way[0] == 0.0) & (way[1] == 0.0) & (way[2] == 0.0)] = -1.0  # hits nothing
     return start, np.ascontiguousarray(way), limit, np.full(n, np.inf)

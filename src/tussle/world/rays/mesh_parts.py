@@ -11,12 +11,12 @@ from typing import Any
 
 import numpy as np
 
-from tussle.errors import ParameterError, TussleError
+from tussle.errors import ParameterError, TussleError, clipped
 from tussle.world.rays.files import BY_TRIMESH, bytes_of, corners
 from tussle.world.rays.surfaces import MeshPart
 from tussle.world.rays.textures import decoded, reduced
 
-MOST_IMAGES = 32
+MAX_IMAGES = 32
 """Images of a mesh."""
 IMAGES = (".png", ".jpg", ".jpeg", ".tif", ".tiff")
 
@@ -41,7 +41,7 @@ def read_parts(
         those that do not exist.
 
     Raises:
-        ParameterError: An image cannot be read or is too large, or the mesh has more than `MOST_IMAGES`.
+        ParameterError: An image cannot be read or is too large, or the mesh has more than `MAX_IMAGES`.
         TussleError: It names a file that `check` refuses.
     """
     if path.suffix.lower() not in BY_TRIMESH:
@@ -52,7 +52,7 @@ def read_parts(
         raise
     except Exception as error:  # readers of damaged data raise errors of many kinds
         raise ParameterError(
-            f"{path}: its colours cannot be read: {type(error).__name__}: {str(error)[:200]}"
+            f"{path}: its colours cannot be read: {type(error).__name__}: {clipped(str(error), 200)}"
         ) from error
 
 
@@ -80,8 +80,8 @@ def _parts(
         image = _image(mesh.visual)
         key = id(image) if image is not None else 0
         if key and key not in images:
-            if len(images) == MOST_IMAGES:
-                raise ParameterError(f"{path}: the mesh has more than {MOST_IMAGES} images")
+            if len(images) == MAX_IMAGES:
+                raise ParameterError(f"{path}: the mesh has more than {MAX_IMAGES} images")
             images[key] = reduced(str(path), image)
         vertices = trimesh.transform_points(corners(mesh.vertices), matrix) * scale + np.array(position)
         piece, has_colours = _piece(mesh, vertices, bool(key))
@@ -147,7 +147,7 @@ def _embedded(data: bytes) -> Iterator[bytes]:
         uri = str(each.get("uri", ""))
         return base64.b64decode(uri.partition(",")[2]) if uri.startswith("data:") else b""
 
-    for image in content.get("images", ())[: MOST_IMAGES + 1]:
+    for image in content.get("images", ())[: MAX_IMAGES + 1]:
         if "bufferView" in image:
             view = content["bufferViews"][image["bufferView"]]
             buffer = content["buffers"][view["buffer"]]

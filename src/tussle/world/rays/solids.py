@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 
 from tussle.world.rays import kernels, touching
-from tussle.world.rays.hits import FARTHEST_RAY, Hits, checked_numbers, checked_vectors, new_rays
+from tussle.world.rays.hits import MAX_RAY, Hits, checked_numbers, checked_vectors, new_rays
 from tussle.world.rays.surfaces import HeightField, TriangleMesh
 from tussle.world.shapes import FlatGround, Polyhedron, Sphere, Volume
 
-PIECE, SHORTEST_PIECE = 0.1, 1e-4
+PIECE, MIN_PIECE = 0.1, 1e-4
 """Half length of the pieces of a path that are not divided further: the larger of two lengths, in radii of the sphere and in metres.
 
 Of what a sphere of radius r sweeps, spheres whose centres are 2 h apart leave out less than a depth of h^2 / (2 r).
@@ -148,7 +148,7 @@ class Solids:
     def touches(self, points: object, radius: object) -> np.ndarray:
         """Return whether spheres round points [m], (3, n), touch a part or lie inside one, (n,)."""
         center = checked_vectors("points", points)
-        reach = np.minimum(checked_numbers("radius", radius, center.shape[1]), FARTHEST_RAY)
+        reach = np.minimum(checked_numbers("radius", radius, center.shape[1]), MAX_RAY)
         touches = np.zeros(center.shape[1], np.bool_)
         if self.n_triangles:
             touching.touch(self._tree, self._items, center, reach, touches)
@@ -164,12 +164,12 @@ class Solids:
 
         A piece of a path is clear if the ball that encloses it is; otherwise it is divided. A path beyond the reach of rays is not clear.
         """
-        size = np.minimum(checked_numbers("radius", radius, start.shape[1]), FARTHEST_RAY)
+        size = np.minimum(checked_numbers("radius", radius, start.shape[1]), MAX_RAY)
         with np.errstate(over="ignore"):
             x, y, z = way = 0.5 * (end - start)
             half = np.sqrt(x * x + y * y + z * z)
             center = 0.5 * (start + end)
-        is_sane = half <= FARTHEST_RAY
+        is_sane = half <= MAX_RAY
         touches: np.ndarray = ~is_sane
         path = np.flatnonzero(is_sane)
         is_near = self.touches(center[:, path], size[path] + half[path])
@@ -189,7 +189,7 @@ class Solids:
             len(path)
         )  # of the middle of a piece, from the middle of the path, in its half lengths
         while len(path):
-            is_long = part * half[path] > np.maximum(PIECE * size[path], SHORTEST_PIECE)
+            is_long = part * half[path] > np.maximum(PIECE * size[path], MIN_PIECE)
             reach = size[path] + np.where(is_long, part * half[path], 0.0)
             meets = self.touches(center[:, path] + place * way[:, path], reach)
             touches[path[meets & ~is_long]] = True

@@ -11,9 +11,9 @@ from tussle.errors import ParameterError, listed, nearest_name
 from tussle.numeric import rng
 from tussle.numeric.arrays import unit
 
-MOST_HEIGHTS = 4_000_000
-MOST_FACES = 2_000_000
-FARTHEST = 1e9
+MAX_HEIGHTS = 4_000_000
+MAX_FACES = 2_000_000
+MAX_COORDINATE = 1e9
 """Largest coordinate of a surface [m]: positions there are still good to a micrometre."""
 TECHNIQUES = ("RANDOM_WALK", "LINEAR", "LINEAR_WALK")
 
@@ -81,9 +81,9 @@ class HeightField:
 
     def __post_init__(self) -> None:
         height = np.ascontiguousarray(self.height, np.float64)
-        if height.ndim != 2 or min(height.shape) < 2 or height.size > MOST_HEIGHTS:
+        if height.ndim != 2 or min(height.shape) < 2 or height.size > MAX_HEIGHTS:
             raise ParameterError(
-                f"HeightField.height has shape {height.shape}; it takes (ny, nx) with 2 x 2 to {MOST_HEIGHTS:,} heights"
+                f"HeightField.height has shape {height.shape}; it takes (ny, nx) with 2 x 2 to {MAX_HEIGHTS:,} heights"
             )
         for name in ("west", "south", "cell"):
             object.__setattr__(self, name, float(getattr(self, name)))
@@ -128,8 +128,8 @@ class HeightField:
                 f"length = {length!r} with cell = {cell!r} is not allowed; they take lengths > 0 m"
             )
         nx, ny = (max(2, round(side / cell) + 1) for side in length)
-        if nx * ny > MOST_HEIGHTS:
-            raise ParameterError(f"{nx:,} x {ny:,} heights are not allowed; at most {MOST_HEIGHTS:,} are")
+        if nx * ny > MAX_HEIGHTS:
+            raise ParameterError(f"{nx:,} x {ny:,} heights are not allowed; at most {MAX_HEIGHTS:,} are")
         return cls(
             _hills((ny, nx), technique, z_std, seed) + center[2],
             center[0] - 0.5 * cell * (nx - 1),
@@ -143,7 +143,7 @@ class HeightField:
 
     @property
     def grid(self) -> np.ndarray:
-        """For kernels: west, south, width and depth of a cell, least and greatest height [m], (6,)."""
+        """Numbers of the grid for kernels: west, south, width and depth of a cell, least and greatest height [m], (6,)."""
         return np.array([self.west, self.south, self.cell, self.cell, self.height.min(), self.height.max()])
 
     def triangles(self) -> np.ndarray:
@@ -205,8 +205,8 @@ class TriangleMesh:
             raise ParameterError(
                 f"TriangleMesh: vertices have shape {vertices.shape} and faces {faces.shape}; they take (n, 3) and (m, 3)"
             )
-        if not 0 < len(faces) <= MOST_FACES:
-            raise ParameterError(f"TriangleMesh has {len(faces):,} triangles; it takes 1 to {MOST_FACES:,}")
+        if not 0 < len(faces) <= MAX_FACES:
+            raise ParameterError(f"TriangleMesh has {len(faces):,} triangles; it takes 1 to {MAX_FACES:,}")
         if not np.issubdtype(faces.dtype, np.integer) or faces.min() < 0 or faces.max() >= len(vertices):
             raise ParameterError(
                 f"TriangleMesh.faces refer to other than the {len(vertices):,} vertices; they take numbers from 0"
@@ -250,10 +250,10 @@ class TriangleMesh:
 
 
 def _check_coordinates(name: str, values: np.ndarray) -> None:
-    wrong = ~(np.abs(values) <= FARTHEST)
+    wrong = ~(np.abs(values) <= MAX_COORDINATE)
     if wrong.any():
         raise ParameterError(
-            f"{name} has the coordinate {values[wrong].flat[0]!r}; coordinates are numbers within +-{FARTHEST:g} m"
+            f"{name} has the coordinate {values[wrong].flat[0]!r}; coordinates are numbers within +-{MAX_COORDINATE:g} m"
         )
 
 

@@ -7,18 +7,18 @@ from typing import Any
 
 import numpy as np
 
-from tussle.errors import MissingExtraError, ParameterError
+from tussle.errors import MissingExtraError, ParameterError, clipped
 
-MOST_PIXELS = 32_000_000
+MAX_PIXELS = 32_000_000
 """Pixels of an image that is decoded: 128 MB."""
-MOST_SIDE = 2048
+MAX_SIDE = 2048
 """Pixels of the longer side that are kept: every WebGL 2 browser takes them."""
 FORMATS = ("PNG", "JPEG", "TIFF")
 JPEG_QUALITY = 88
 
 
 def decoded(where: str, data: bytes) -> np.ndarray:
-    """Red, green, blue of an image from its upper left corner, (height, width, 3), uint8, at most `MOST_SIDE` wide and high.
+    """Red, green, blue of an image from its upper left corner, (height, width, 3), uint8, at most `MAX_SIDE` wide and high.
 
     Args:
         where: File that has it, for messages.
@@ -39,7 +39,7 @@ def decoded(where: str, data: bytes) -> np.ndarray:
         raise
     except Exception as error:  # decoders of damaged data raise errors of many kinds
         raise ParameterError(
-            f"{where}: it is no PNG, JPEG or TIFF that can be read: {str(error)[:200]}"
+            f"{where}: it is no PNG, JPEG or TIFF that can be read: {clipped(str(error), 200)}"
         ) from error
 
 
@@ -50,15 +50,15 @@ def reduced(where: str, image: Any) -> np.ndarray:
         ParameterError: It has too many pixels, or cannot be decoded.
     """
     width, height = image.size
-    if width * height > MOST_PIXELS:
+    if width * height > MAX_PIXELS:
         raise ParameterError(
-            f"{where}: the image has {width:,} x {height:,} pixels; it takes at most {MOST_PIXELS:,}"
+            f"{where}: the image has {width:,} x {height:,} pixels; it takes at most {MAX_PIXELS:,}"
         )
     try:
-        image.thumbnail((MOST_SIDE, MOST_SIDE))
+        image.thumbnail((MAX_SIDE, MAX_SIDE))
         return np.asarray(image.convert("RGB"))
     except Exception as error:  # decoders of damaged data raise errors of many kinds
-        raise ParameterError(f"{where}: the image cannot be read: {str(error)[:200]}") from error
+        raise ParameterError(f"{where}: the image cannot be read: {clipped(str(error), 200)}") from error
 
 
 def jpeg(pixels: np.ndarray) -> bytes:

@@ -9,8 +9,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from tussle.errors import ParameterError, listed
-from tussle.world.rays.surfaces import MOST_FACES
+from tussle.errors import ParameterError, clipped, listed
+from tussle.world.rays.surfaces import MAX_FACES
 
 TYPES = {"float": ">f4", "double": ">f8", "int": ">i4", "long": ">i8", "vtktypeint64": ">i8"}
 CELLS = ("POLYGONS", "TRIANGLE_STRIPS")
@@ -37,8 +37,8 @@ class _Reader:
 
     def array(self, n: int, kind: str) -> np.ndarray:
         """The next n numbers."""
-        if not 0 <= n <= 12 * MOST_FACES:
-            raise ParameterError(f"an array of {n:,} numbers is not allowed; at most {12 * MOST_FACES:,} are")
+        if not 0 <= n <= 12 * MAX_FACES:
+            raise ParameterError(f"an array of {n:,} numbers is not allowed; at most {12 * MAX_FACES:,} are")
         dtype = np.dtype(TYPES[kind])
         if self.is_binary:
             end = self.at + n * dtype.itemsize
@@ -83,7 +83,7 @@ def read_vtk(data: bytes) -> tuple[np.ndarray, np.ndarray]:
                     faces.append(_triangles(start, corners, words[0]))
             elif words[0] not in ("METADATA", "INFORMATION", "NAME", "DATA"):
                 raise ParameterError(
-                    f"the part {words[0][:40]!r} is not known; {listed(('POINTS', *CELLS, *SKIPPED))}"
+                    f"the part {clipped(words[0])!r} is not known; {listed(('POINTS', *CELLS, *SKIPPED))}"
                 )
     except (ValueError, IndexError, KeyError, OverflowError) as error:
         if isinstance(error, ParameterError):

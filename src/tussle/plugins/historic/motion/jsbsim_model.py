@@ -15,7 +15,7 @@ from tussle.world.geodesy import Origin
 METRE, KNOT = 3.28084, 0.5144444
 """SCRIMMAGE's metre [ft] and knot [m/s]."""
 DECIMALS = 6
-"""Of degrees and metres, in which an aircraft is told its place."""
+"""Number of decimals of degrees and metres in positions that are given to JSBSim."""
 
 
 class SphericalEarth(JSBSimAircraft):
@@ -26,6 +26,10 @@ class SphericalEarth(JSBSimAircraft):
     """
 
     is_historic = True
+
+    def stand_in(self, is_moving: bool) -> tuple[str, dict[str, Any], str]:
+        """Return none: compiled aircraft fly over the ellipsoid."""
+        return "", {}, ""
 
     def start_values(self, body: Any, rows: np.ndarray) -> np.ndarray:
         """Return the states of some rows as the properties PLACE and MOTION, (12, m)."""

@@ -12,7 +12,7 @@ from tussle.numeric.quaternion import quat_conjugate, quat_multiply
 from tussle.plugins.historic.integration import advance_by, normalized, quat_rates, rk4_step, rotated
 from tussle.plugins.stock.motion import rigid_body_6dof
 
-MOST_TURN = 0.001
+MAX_TURN = 0.001
 """Largest rate that a step begins with [rad/s]."""
 
 
@@ -52,7 +52,7 @@ class RigidBody6DOF(rigid_body_6dof.RigidBody6DOF):
 def _step(x: np.ndarray, u: dict[str, np.ndarray], p: dict[str, Any], h: float) -> None:
     start = x[10:]
     x[3] = np.clip(x[3], p["min_velocity"], p["max_velocity"])
-    turn = np.clip(x[3], -MOST_TURN, MOST_TURN)
+    turn = np.clip(x[3], -MAX_TURN, MAX_TURN)
     spin = np.array([u["aileron"], u["elevator"], u["rudder"]])
 
     def f(s: np.ndarray) -> np.ndarray:

@@ -15,7 +15,7 @@ from tussle.plugins.stock.motion import simple_car
 
 STEERING_MAX = 0.25 * math.pi - 1e-4
 GRAVITY = 9.8
-LEAST_FORCE = 0.1
+MIN_FORCE = 0.1
 """Force that stops the car along its axis [N]."""
 
 
@@ -60,7 +60,7 @@ class SimpleCar(simple_car.SimpleCar):
 def _step(x: np.ndarray, u: dict[str, np.ndarray], p: dict[str, Any], h: float, falls: bool) -> None:
     speed = np.clip(u["speed"], 0.0, p["max_velocity"])
     turn = speed / p["length"] * tan(np.clip(u["steering"], -STEERING_MAX, STEERING_MAX))
-    is_free = np.array([np.abs(u[name]) <= LEAST_FORCE for name in ("force_x", "force_y", "force_z")])
+    is_free = np.array([np.abs(u[name]) <= MIN_FORCE for name in ("force_x", "force_y", "force_z")])
     fall = -GRAVITY * p["mass"] if falls else 0.0 * speed
 
     def f(s: np.ndarray) -> np.ndarray:

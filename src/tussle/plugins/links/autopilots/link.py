@@ -10,15 +10,14 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Sequence
 
 from tussle.errors import ParameterError
+from tussle.pacing import Pace
 from tussle.plugins.links.autopilots.frames import VehicleState
 
-NAP = 0.01
-"""Longest wait before the clock, an interruption and the connections are looked at [s]."""
-LONGEST_STEP = 1.0
+TICK_PERIOD = 0.01
+"""Longest wait before a state is sent again [s]."""
+MAX_STEP_TIME = 1.0
 """Wall time of a step beyond which the simulation is paused, or waits for another autopilot [s]."""
-CATCH_UP = 0.2
-"""How far a simulation may lag behind the clock before the lag is forgotten [s]."""
-MOST_PORT = 65535
+MAX_PORT = 65535
 
 
 class AutopilotLink(ABC):
@@ -64,7 +63,7 @@ class AutopilotLink(ABC):
     def leave(self) -> None:
         """End a step. Without lockstep, an autopilot that has been silent for too long has failed; a pause is not silence."""
         now = time.monotonic()
-        self._silence += min(now - self._left, LONGEST_STEP)
+        self._silence += min(now - self._left, MAX_STEP_TIME)
         self._left = now
         if self._silence > self.timeout and not self.lockstep:
             self.fail(f"silent for {self.timeout:g} s")
@@ -105,8 +104,8 @@ class OwnedPorts(dict[int, str]):
         """
         ports = tuple(ports)
         for port in ports:
-            if port in self or not 0 < port <= MOST_PORT:
-                why = f"is that of {self[port]}" if port in self else f"is not from 1 to {MOST_PORT}"
+            if port in self or not 0 < port <= MAX_PORT:
+                why = f"is that of {self[port]}" if port in self else f"is not from 1 to {MAX_PORT}"
                 raise ParameterError(f"port {port} {why}; {advice}")
         self.update(dict.fromkeys(ports, owner))
 
@@ -167,20 +166,14 @@ def await_links(links: Sequence[AutopilotLink], is_interrupted: Callable[[], boo
         for link in waiting:
             for each in link.sockets():
                 poller.register(each, select.POLLIN)
-        poller.poll(math.ceil(1000.0 * min(NAP, limit - now)))
+        poller.poll(math.ceil(1000.0 * min(TICK_PERIOD, limit - now)))
 
 
 class StepClock:
     """The clock of a simulation that runs beside its autopilots."""
 
-    def __init__(self) -> None:
-        self._start = -math.inf
+    def __init__(self, warp: float) -> None:
+        self.pace = Pace(warp)
 
     def end(self) -> None:
         """Nothing is open."""
-
-    def wait(self, t: float, is_interrupted: Callable[[], bool]) -> None:
-        """Wait until a time [s] since the start; a lag of more than `CATCH_UP` is forgotten."""
-        self._start = max(self._start, time.monotonic() - t - CATCH_UP)
-        while (left := self._start + t - time.monotonic()) > 0.0 and not is_interrupted():
-            time.sleep(min(left, NAP))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Callable, Iterable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,7 @@ from tussle.api import Autonomy, GroupView, Handle, Output, Param, State
 from tussle.api.channel_map import channel_outputs, write_channels
 from tussle.api.channels import DRIVEN_CHANNELS
 from tussle.plugins.links.autopilots.frames import vehicle_states
-from tussle.plugins.links.autopilots.link import MOST_PORT, AutopilotLink, OwnedPorts, StepClock, await_links
+from tussle.plugins.links.autopilots.link import MAX_PORT, AutopilotLink, OwnedPorts, StepClock, await_links
 
 
 class Autopilot(Autonomy):
@@ -28,7 +29,7 @@ class Autopilot(Autonomy):
     )
     timeout = Param(30.0, structural=True, unit="s", gt=0.0, doc="Longest wait for the autopilot, wall time.")
     world_step = Param(
-        0, structural=True, ge=0, le=MOST_PORT, doc="Ports are higher by this for each world of a stack."
+        0, structural=True, ge=0, le=MAX_PORT, doc="Ports are higher by this for each world of a stack."
     )
     for _channel, _unit in DRIVEN_CHANNELS.items():
         vars()[f"{_channel}_out"] = Output(_channel, unit=_unit, doc="Command.")
@@ -81,9 +82,8 @@ class Autopilot(Autonomy):
         links: list[Any] = list(self.link)
         is_interrupted = g.context.is_interrupted
         if links and not self.lockstep:
-            g.context.share("autopilots' clock", StepClock).wait(
-                float(g.t[0]) / self.time_warp, is_interrupted
-            )
+            clock = g.context.share(("autopilots' clock", self.time_warp), partial(StepClock, self.time_warp))
+            clock.pace.hold(float(g.t[0]), g.dt, is_interrupted)
         states, draws = vehicle_states(g, self.last_vel), self.draws(g).T.tolist()
         for link, state, own in zip(links, states, draws, strict=True):
             link.begin(state, own)

@@ -26,7 +26,7 @@ QUEUE = 10
 """Messages that wait for a slow subscriber; older ones are dropped, so that it does not delay the simulation."""
 TF_QUEUE, SENSOR_QUEUE = 100, 5
 """The same for tf, as of tf2_ros, and for sensors, as of the profile for sensor data."""
-MOST_SECONDS = 0.01
+MAX_SECONDS = 0.01
 """Longest time for which a subscriber that has stopped can delay a message [s]."""
 
 
@@ -220,7 +220,7 @@ def _quality(type_: str, depth: int, is_reliable: bool) -> Any:
     from cyclonedds.util import duration
 
     return Qos(
-        Policy.Reliability.Reliable(duration(seconds=MOST_SECONDS))
+        Policy.Reliability.Reliable(duration(seconds=MAX_SECONDS))
         if is_reliable
         else Policy.Reliability.BestEffort,
         Policy.History.KeepLast(depth),

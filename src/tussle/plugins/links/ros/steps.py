@@ -10,7 +10,8 @@ from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
-NAP = 0.05  # [s] longest wait before Ctrl-C is noticed
+from tussle.pacing import POLL_PERIOD
+
 NANO = 1_000_000_000
 
 
@@ -82,7 +83,7 @@ class StepGate:
             self._is_waiting = True
             self._changed.notify_all()
             while self.is_paused and not (self._allowed or self._is_closed or is_interrupted()):
-                self._rest(NAP)
+                self._rest(POLL_PERIOD)
             self._is_waiting = False
             self._allowed = max(self._allowed - 1, 0)
 
@@ -186,7 +187,7 @@ class NodeLink(ABC):
         return self.time_of(*divmod(max(nanoseconds, 0), NANO))
 
     def begin_step(self, g: Any) -> None:
-        """At the first call in a step: publish the states of all robots, then wait while paused."""
+        """Publish the states of all robots, then wait while paused; only the first call in a step does so."""
         step = int(g.step_count[0])
         if step != self._step:
             self._step = step
@@ -216,5 +217,5 @@ class NodeLink(ABC):
                 left = limit - time.monotonic()
                 if left <= 0.0 or self.lost or is_interrupted():
                     return False
-                self._rest(min(left, NAP))
+                self._rest(min(left, POLL_PERIOD))
         return True

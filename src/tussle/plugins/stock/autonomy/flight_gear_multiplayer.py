@@ -25,7 +25,7 @@ LAYOUT = np.dtype(
     ]
 )  # fmt: skip
 """The header and the position message, 232 bytes; properties, which may follow, are not sent."""
-MOST_CALLSIGN, MOST_MODEL = 7, 95
+MAX_CALLSIGN, MAX_MODEL = 7, 95
 """Characters; a zero follows."""
 
 
@@ -51,7 +51,7 @@ class Senders:
     def callsign(self, id_: int, given: str) -> bytes:
         """The callsign of an entity, which no other one has: as it is given, or with the id, else the next free number, at its end."""
         if id_ not in self._callsigns:
-            numbered = (f"{given[: MOST_CALLSIGN - len(str(k))]}{k}" for k in chain([id_], count(1)))
+            numbered = (f"{given[: MAX_CALLSIGN - len(str(k))]}{k}" for k in chain([id_], count(1)))
             self._callsigns[id_] = next(each for each in chain([given], numbered) if each not in self._taken)
             self._taken.add(self._callsigns[id_])
         return self._callsigns[id_].encode()
@@ -86,7 +86,7 @@ class FlightGearMultiplayer(Autonomy):
 
     def check_values(self) -> None:
         """Check the lengths of the texts."""
-        for name, most in (("callsign", MOST_CALLSIGN), ("aircraft_model", MOST_MODEL)):
+        for name, most in (("callsign", MAX_CALLSIGN), ("aircraft_model", MAX_MODEL)):
             value = self.values[name]
             if not (value.isascii() and value.isprintable() and 0 < len(value) <= most):
                 raise ParameterError(

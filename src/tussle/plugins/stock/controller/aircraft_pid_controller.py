@@ -13,7 +13,7 @@ ANGLE_UNITS = "1 1/s s rad"
 ANGLE_TEXT_UNITS = "1 1/s s deg"
 LOOP = "integral error has_error"
 LOOP_DOC = "integral, last error, and 1 after the first call."
-LEAST_SPEED = 1.0  # [m/s], where a climb speed is divided by the speed
+MIN_SPEED = 1.0  # [m/s], where a climb speed is divided by the speed
 
 
 class AircraftPIDController(Controller):
@@ -101,7 +101,7 @@ class AircraftPIDController(Controller):
     ) -> Any:  # fmt: skip
         """Altitude loop and elevation loop."""
         vx, vy, vz = vel
-        speed = max(math.sqrt(vx * vx + vy * vy + vz * vz), LEAST_SPEED)
+        speed = max(math.sqrt(vx * vx + vy * vy + vz * vz), MIN_SPEED)
         climb_speed, altitude = pid_loop(desired_altitude - pos_z, altitude_pid, altitude, dt)
         slope = min(max(climb_speed / speed, -max_pitch), max_pitch)
         error, trim = slope_error(slope, climb, vel, trim, dt)

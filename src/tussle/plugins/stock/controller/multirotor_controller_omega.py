@@ -6,8 +6,8 @@ import numpy as np
 
 from tussle.api import Controller, GroupView, Input, Output, Param
 
-MOST_ROTORS = 8
-ROTORS = range(MOST_ROTORS)
+MAX_ROTORS = 8
+ROTORS = range(MAX_ROTORS)
 
 
 class MultirotorControllerOmega(Controller):

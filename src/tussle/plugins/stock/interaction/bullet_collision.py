@@ -11,7 +11,7 @@ from tussle.numeric.quaternion import quat_multiply, quat_normalize
 from tussle.world.contacts import found, held
 from tussle.world.contacts.solids import StaticSolids
 
-MOST_FOLLOWED = 2.0
+MAX_FOLLOWED = 2.0
 """Largest relative motion per step for which pairs are followed, in sizes of the largest body. Beyond it all pairs would be candidates."""
 FAR = 1e9
 """Coordinate beyond which ways are not followed [m]."""
@@ -155,7 +155,7 @@ class BulletCollision(Interaction):
             np.minimum.at(low[i], w.world, vel[i])
             np.maximum.at(high[i], w.world, vel[i])
         x, y, z = np.where(high > low, high - low, 0.0)
-        motion = np.minimum(w.dt * np.sqrt(x * x + y * y + z * z), MOST_FOLLOWED * size[0])
+        motion = np.minimum(w.dt * np.sqrt(x * x + y * y + z * z), MAX_FOLLOWED * size[0])
         reach = np.maximum(2.02 * size[0] + motion, 1e-6)
         self.reach[w.world] = reach[w.world]  # unchanged in worlds without bodies
         listed_pairs = self.pairs(w)

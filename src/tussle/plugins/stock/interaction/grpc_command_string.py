@@ -11,12 +11,12 @@ import numpy as np
 
 from tussle.api import Interaction, Param, WorldView
 from tussle.declare.messages import Messages, TextMessage
-from tussle.errors import ParameterError, listed, nearest_name
+from tussle.errors import ParameterError, clipped, listed, nearest_name
 from tussle.plugins.links.rpc import COMMANDS, SEND_COMMAND, load_grpc, message_types
 
-MOST_WAITING = 10_000
+MAX_WAITING = 10_000
 """Commands that wait for the next step; further ones are refused."""
-MOST_BYTES = 1024 * 1024
+MAX_BYTES = 1024 * 1024
 ONE_ENTITY = re.compile(r"/(\d{1,9})/(.+)", re.DOTALL)
 """Topic of the existing system for one entity: its id and the topic."""
 
@@ -73,17 +73,17 @@ class CommandServer:
 
     Args:
         address: Host and port.
-        heard: Network and name of each topic that plugins listen to.
+        subscribed: Network and name of each topic that plugins listen to.
 
     Attributes:
         last_id: Largest id of an entity that has been born.
         waiting: Network, topic, text, and id of the entity that it is for or 0, of commands that are not yet published.
     """
 
-    def __init__(self, address: str, heard: list[tuple[str, str]]) -> None:
+    def __init__(self, address: str, subscribed: list[tuple[str, str]]) -> None:
         grpc = load_grpc("GRPCCommandString")
         self.waiting: deque[tuple[str, str, str, int]] = deque()
-        self._heard, self._status, self.last_id = heard, grpc.StatusCode, 0
+        self._subscribed, self._status, self.last_id = subscribed, grpc.StatusCode, 0
         types = message_types("scrimmage_msgs", **COMMANDS)
         self._ack = types["CommandAck"]
         _, service, method = SEND_COMMAND.split("/")
@@ -91,7 +91,7 @@ class CommandServer:
             self._take, types["CommandString"].FromString, self._ack.SerializeToString
         )
         # Without the first option, two servers share a port in silence.
-        options = [("grpc.so_reuseport", 0), ("grpc.max_receive_message_length", MOST_BYTES)]
+        options = [("grpc.so_reuseport", 0), ("grpc.max_receive_message_length", MAX_BYTES)]
         self._server = grpc.server(ThreadPoolExecutor(2, "gRPC commands"), options=options)
         self._server.add_generic_rpc_handlers(
             [grpc.method_handlers_generic_handler(service, {method: handler})]
@@ -111,17 +111,17 @@ class CommandServer:
             if not 0 < to <= self.last_id:
                 call.abort(
                     self._status.INVALID_ARGUMENT,
-                    f"topic {command.topic[:80]!r}: no entity has had the id {to}; ids are 1 to {self.last_id}",
+                    f"topic {clipped(command.topic)!r}: no entity has had the id {to}; ids are 1 to {self.last_id}",
                 )
-        if (network, topic) not in self._heard:
-            names = [" ".join(each) for each in self._heard]
+        if (network, topic) not in self._subscribed:
+            names = [" ".join(each) for each in self._subscribed]
             near = nearest_name(f"{network} {topic}", names)
             call.abort(
                 self._status.INVALID_ARGUMENT,
-                f"no plugin listens to texts on network {network[:80]!r}, topic {topic[:80]!r}{near}; {listed(names)}",
+                f"no plugin listens to texts on network {clipped(network)!r}, topic {clipped(topic)!r}{near}; {listed(names)}",
             )
-        if len(self.waiting) >= MOST_WAITING:
-            call.abort(self._status.RESOURCE_EXHAUSTED, f"{MOST_WAITING} commands wait for the next step")
+        if len(self.waiting) >= MAX_WAITING:
+            call.abort(self._status.RESOURCE_EXHAUSTED, f"{MAX_WAITING} commands wait for the next step")
         self.waiting.append((network, topic, command.value, to))
         return self._ack(success=1)
 

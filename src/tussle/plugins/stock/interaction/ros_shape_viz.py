@@ -12,7 +12,7 @@ from tussle.plugins.links.ros.robot import ROOT
 
 SPHERE, POINTS = 2, 8  # visualization_msgs/Marker
 ADD = 0
-MOST_MARKERS, MOST_POINTS = 1000, 100_000
+MAX_MARKERS, MAX_POINTS = 1000, 100_000
 
 
 class ROSShapeViz(Interaction):
@@ -74,7 +74,7 @@ class ReceivedMarkers:
         self.shapes: dict[tuple[str, int], tuple[str, dict[str, Any]]] = {}
         self.fault = ""
         link.advertise("tussle/markers", link.ros.MarkerArray)
-        link.subscribe("shapes", link.ros.Marker, self._take, MOST_MARKERS)
+        link.subscribe("shapes", link.ros.Marker, self._take, MAX_MARKERS)
 
     def _take(self, marker: Any) -> None:
         key = str(marker.ns), int(marker.id)
@@ -85,8 +85,8 @@ class ReceivedMarkers:
         colour = tuple(
             255.0 * min(max(part, 0.0), 1.0) for part in (marker.color.r, marker.color.g, marker.color.b)
         )
-        if len(places) > MOST_POINTS or (len(self.shapes) >= MOST_MARKERS and key not in self.shapes):
-            self.fault = f"/shapes: more than {MOST_MARKERS} markers or {MOST_POINTS} points of marker {key}"
+        if len(places) > MAX_POINTS or (len(self.shapes) >= MAX_MARKERS and key not in self.shapes):
+            self.fault = f"/shapes: more than {MAX_MARKERS} markers or {MAX_POINTS} points of marker {key}"
             return
         pos = np.array([[p.x, p.y, p.z] for p in places]).reshape(-1, 3).T
         size = float(marker.scale.x)

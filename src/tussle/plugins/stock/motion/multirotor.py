@@ -13,7 +13,7 @@ from tussle.errors import ParameterError
 from tussle.numeric.quaternion import quat_from_euler, quat_rotate
 from tussle.numeric.rigid_body import add, cross, newton_euler, scale, to_body, to_world
 
-MOST_ROTORS = 8
+MAX_ROTORS = 8
 PLUS = ((-1.0, 0.0, -0.175), (-1.0, 0.0, 0.175), (1.0, 0.175, 0.0), (1.0, -0.175, 0.0))
 
 
@@ -31,8 +31,8 @@ class RotorsParam(Param):
     def convert(self, value: Any, where: str = "", from_geodetic: Callable[..., Any] | None = None) -> Any:
         """Check and convert rotors."""
         rotors = super().convert(value, where, from_geodetic)
-        if not 1 <= len(rotors) <= MOST_ROTORS or any(abs(rotor[0]) != 1.0 for rotor in rotors):
-            text = f"1 to {MOST_ROTORS} rows [CW or CCW x y z roll pitch yaw]"
+        if not 1 <= len(rotors) <= MAX_ROTORS or any(abs(rotor[0]) != 1.0 for rotor in rotors):
+            text = f"1 to {MAX_ROTORS} rows [CW or CCW x y z roll pitch yaw]"
             raise ParameterError(f"{self._place(where)} = {value!r} is not allowed; it takes {text}")
         return rotors
 

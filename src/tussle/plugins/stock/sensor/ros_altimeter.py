@@ -14,7 +14,7 @@ from tussle.plugins.links.ros.robot import height_above_floor
 
 
 class AltimeterTopic(NamedTuple):
-    """Where the measurements of an entity go."""
+    """Topic of the measurements of one entity."""
 
     link: RosLink
     namespace: str

@@ -24,7 +24,7 @@ from tussle.view.export.film.prescan import (
 )
 
 VIEW_ANGLE = math.radians(32.0)
-"""Vertical angle of view: a long lens, so that distant entities stay comparable to near ones."""
+"""Vertical angle of view: that of a long lens, so that distant entities stay comparable to near ones."""
 ELEVATION = math.radians(33.0)
 """Elevation of the overview camera above its target."""
 AZIMUTH = math.radians(-105.0)
@@ -32,7 +32,7 @@ AZIMUTH = math.radians(-105.0)
 FOLLOW_ELEVATION = math.radians(11.0)
 MARGIN = 0.86
 """Share of the picture that the entities may fill."""
-LARGEST, SMALLEST, LEGIBLE = 0.026, 0.0085, 10.0
+MAX_SIZE, MIN_SIZE, LEGIBLE = 0.026, 0.0085, 10.0
 """Limits of a model's length as a share of the picture's width; its least length [pixels]."""
 CROWDING = 1.3
 """Length of a model between these limits, as a share of the side of the square that each entity has; never more than the distance
@@ -129,16 +129,16 @@ class FitAll(Camera):
         needed = np.maximum(np.abs(right) / self.aspect, np.abs(up)) / MARGIN
         # Corners in front of the middle look larger.
         toward = 0.0 if self._is_top else back * math.tan(0.5 * VIEW_ANGLE)
-        # From nearer than this, models would look larger than LARGEST.
-        return max(float((needed + toward).max()), 0.5 * self.longest / LARGEST / self.aspect)
+        # From nearer than this, models would look larger than MAX_SIZE.
+        return max(float((needed + toward).max()), 0.5 * self.longest / MAX_SIZE / self.aspect)
 
     def _lengths(self, seen: np.ndarray, area: np.ndarray) -> np.ndarray:
         """Length of models [m], (m,), from the width seen [m] and the area of all entities [m^2] at each sample."""
         t, crowds = prescan(self.moments, crowd_of, 2, N_CROWD_SAMPLES)
         spacing, count = (np.interp(self._t, t, column) for column in crowds.T)
         length = np.fmin(spacing, CROWDING * np.sqrt(area / count))
-        smallest = min(LARGEST, max(SMALLEST, LEGIBLE / self.options.size[0]))
-        return np.clip(np.where(np.isfinite(length), length, np.inf), smallest * seen, LARGEST * seen)
+        smallest = min(MAX_SIZE, max(MIN_SIZE, LEGIBLE / self.options.size[0]))
+        return np.clip(np.where(np.isfinite(length), length, np.inf), smallest * seen, MAX_SIZE * seen)
 
     def view(self, t: float) -> View:
         *middle, half, length = (float(np.interp(t, self._t, curve)) for curve in self._curves.T)

@@ -11,7 +11,7 @@ from tussle.view.frame import Frame
 from tussle.view.recording import Recording
 
 MAX_PICTURES = 1_000_000
-"""More than eleven hours of film at 25 pictures per second."""
+"""Largest number of pictures of a film: eleven hours at 25 pictures per second."""
 JUMP_OF_EXTENT = 0.25
 """Share of the diagonal of all positions above which a move between two records is a jump, as across a periodic world."""
 

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from tussle.errors import ParameterError, listed, nearest_name
 
 CAMERAS = ("overview", "top", "follow")
-LEAST_SIZE, MOST_SIZE = 16, 7680
-MOST_FPS = 240.0
-LEAST_FACTOR, MOST_FACTOR = 1e-6, 1e6
+MIN_SIZE, MAX_SIZE = 16, 7680
+MAX_FPS = 240.0
+MIN_FACTOR, MAX_FACTOR = 1e-6, 1e6
 
 
 @dataclass(frozen=True)
@@ -61,15 +61,15 @@ class FilmOptions:
             )
         for name in ("speed", "fps", "zoom", "scale"):
             value = getattr(self, name)
-            if value is not None and not LEAST_FACTOR <= value <= MOST_FACTOR:
+            if value is not None and not MIN_FACTOR <= value <= MAX_FACTOR:
                 raise ParameterError(
-                    f"{name} = {value!r} is not allowed; it takes a number from {LEAST_FACTOR:g} to {MOST_FACTOR:g}"
+                    f"{name} = {value!r} is not allowed; it takes a number from {MIN_FACTOR:g} to {MAX_FACTOR:g}"
                 )
-        if self.fps > MOST_FPS:
-            raise ParameterError(f"fps = {self.fps:g} is not allowed; it takes up to {MOST_FPS:g}")
-        if self.trails is not None and self.trails != 0.0 and not LEAST_FACTOR <= self.trails < math.inf:
+        if self.fps > MAX_FPS:
+            raise ParameterError(f"fps = {self.fps:g} is not allowed; it takes up to {MAX_FPS:g}")
+        if self.trails is not None and self.trails != 0.0 and not MIN_FACTOR <= self.trails < math.inf:
             raise ParameterError(
-                f"trails = {self.trails!r} is not allowed; it takes 0 or a number of seconds >= {LEAST_FACTOR:g}"
+                f"trails = {self.trails!r} is not allowed; it takes 0 or a number of seconds >= {MIN_FACTOR:g}"
             )
         for name in ("start", "stop", "at"):
             value = getattr(self, name)
@@ -79,8 +79,8 @@ class FilmOptions:
             raise ParameterError(
                 f"stop = {self.stop:g} s is not allowed; it takes a time after start = {self.start:g} s"
             )
-        if not all(LEAST_SIZE <= n <= MOST_SIZE and n % 2 == 0 for n in self.size):
+        if not all(MIN_SIZE <= n <= MAX_SIZE and n % 2 == 0 for n in self.size):
             raise ParameterError(
                 f"size = {self.size[0]}x{self.size[1]} is not allowed; it takes even numbers of pixels "
-                f"from {LEAST_SIZE} to {MOST_SIZE}"
+                f"from {MIN_SIZE} to {MAX_SIZE}"
             )

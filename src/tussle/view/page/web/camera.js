@@ -8,7 +8,7 @@ const FIELD_OF_VIEW = (45 * Math.PI) / 180;
 const HASTE = { free: 0.07, follow: 0.07, behind: 0.09, overview: 0.35 };
 export const STEEPEST = Math.PI / 2;
 /** Nearest that an overview comes [m]. */
-const LEAST_DISTANCE = 6;
+const MIN_DISTANCE = 6;
 /** Where the eye is at first, seen from what it looks at: south, a little west, and above. */
 export const FIRST_YAW = (-115 * Math.PI) / 180;
 export const FIRST_PITCH = 0.5;
@@ -180,7 +180,7 @@ export class Camera {
     const tangent = Math.tan(FIELD_OF_VIEW / 2);
     const wide = 1 / (tangent * aspect * (1 - room.left - room.right));
     const tall = 1 / (tangent * (1 - room.top - room.bottom));
-    let distance = LEAST_DISTANCE;
+    let distance = MIN_DISTANCE;
     each((x, y, z) => {
       const across = Math.abs(right[0] * x + right[1] * y + right[2] * z - middle[0]) * wide;
       const upward = Math.abs(up[0] * x + up[1] * y + up[2] * z - middle[1]) * tall;

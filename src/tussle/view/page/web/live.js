@@ -7,7 +7,7 @@ import { Layer } from './layer.js';
 import { lastWhere } from './ordered.js';
 
 /** States of past frames that are kept; of more, every other frame goes. */
-const MOST_PAST = 1e6;
+const MAX_PAST = 1e6;
 
 export class Live extends Layer {
   /** @param {PageData} page @param {() => void} changed */
@@ -76,7 +76,7 @@ export class Live extends Layer {
   /** @param {Moment[]} past */
   keep(past) {
     const nStates = past.reduce((sum, each) => sum + each.n, 0);
-    this.past = nStates > MOST_PAST ? past.filter((_, i) => i % 2 || i > past.length - 20) : past;
+    this.past = nStates > MAX_PAST ? past.filter((_, i) => i % 2 || i > past.length - 20) : past;
   }
 
   /** @param {Status} status */

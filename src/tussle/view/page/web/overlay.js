@@ -8,8 +8,8 @@ import { lastWhere } from './ordered.js';
 import { pixelOf } from './camera.js';
 import { KINDS } from './events.js';
 
-const MOST_LABELS = 150;
-const MOST_FLASHES = 200;
+const MAX_LABELS = 150;
+const MAX_FLASHES = 200;
 /** Seconds, as the watcher feels them, that a flash lasts. */
 export const FLASH = 0.9;
 
@@ -87,11 +87,11 @@ export class Overlay {
     const { shown } = layer;
     const inView = slots.map((slot) => ({ slot, pixel: pixelOf(view, shown.placeIn(slot)) }))
       .filter(({ pixel }) => pixel && pixel[0] > 0 && pixel[1] > 0 && pixel[0] < view.width && pixel[1] < view.height)
-      .sort((a, b) => a.pixel[2] - b.pixel[2]).slice(0, 2 * MOST_LABELS).map(({ slot }) => slot);
+      .sort((a, b) => a.pixel[2] - b.pixel[2]).slice(0, 2 * MAX_LABELS).map(({ slot }) => slot);
     let n = 0;
     for (const slot of new Set([...first, ...inView])) {
       const pixel = pixelOf(view, shown.placeIn(slot));
-      if (!pixel || n >= MOST_LABELS) continue;
+      if (!pixel || n >= MAX_LABELS) continue;
       const must = first.includes(slot);
       const colour = must ? this.ink : this.soft(layer.colourOf(slot));
       const gap = Math.max(9, 0.55 * pixelsOf(slot, pixel[2]));
@@ -111,7 +111,7 @@ export class Overlay {
   flashes(view, layer, t, seconds) {
     const { events } = layer;
     const last = lastWhere(events.length, (i) => events[i].t <= t + 1e-9);
-    for (let i = last; i >= 0 && events[i].t > t - seconds && last - i < MOST_FLASHES; i--) {
+    for (let i = last; i >= 0 && events[i].t > t - seconds && last - i < MAX_FLASHES; i--) {
       const { kind, id, other, t: when } = events[i];
       if (kind === 'birth' || kind === 'end' || !id) continue;
       const place = layer.sampleAt(when)?.placeOf(kind === 'capture' ? other : id);

@@ -10,7 +10,7 @@ import { steps } from './series.js';
 /** @import { Series } from './series.js' */
 
 /** Settings in which two runs differ that are shown at once. */
-const MOST_DIFFERING = 4;
+const MAX_DIFFERING = 4;
 
 export class Panels {
   /** @param {PageData} page @param {Live | Recorded} layer @param {Set<number>} hidden teams @param {() => void} changed */
@@ -49,8 +49,8 @@ export class Panels {
       say(byId('subtitle'), [seed && `seed ${seed}`, n, seconds].filter(Boolean).join(' · '));
     }
     const differing = page.differing?.map(([path, a, b]) => `${path} ${a} and ${b}`) || [];
-    const more = differing.length > MOST_DIFFERING ? ` and ${differing.length - MOST_DIFFERING} more, see About` : '';
-    const settings = differing.length ? ` · settings of A and B: ${differing.slice(0, MOST_DIFFERING).join(', ')}${more}` : '';
+    const more = differing.length > MAX_DIFFERING ? ` and ${differing.length - MAX_DIFFERING} more, see About` : '';
+    const settings = differing.length ? ` · settings of A and B: ${differing.slice(0, MAX_DIFFERING).join(', ')}${more}` : '';
     byId('lead').hidden = !page.lead;
     say(byId('lead'), (page.lead || '') + settings);
     this.showNotes(page.notes);

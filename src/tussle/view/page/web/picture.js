@@ -14,9 +14,9 @@ import { Reach } from './reach.js';
 import { FLASH, Overlay } from './overlay.js';
 
 /** Least size of a model [pixels], where none may be too small to see. */
-const LEAST_SIZE = 18;
+const MIN_SIZE = 18;
 /** Distance from the anchor above which another is taken [m]: 32 bits tell places 4 mm apart there. */
-const MOST_DISTANCE = 5e4;
+const MAX_DISTANCE = 5e4;
 
 export class Picture {
   /** @param {Player} player */
@@ -116,7 +116,7 @@ export class Picture {
   draw() {
     const { gl, camera, canvas, drawn, hidden, chosen } = this.player;
     const { scenery } = this;
-    const isFar = norm(minus(camera.target, scenery.anchor)) > MOST_DISTANCE;
+    const isFar = norm(minus(camera.target, scenery.anchor)) > MAX_DISTANCE;
     const anchor = isFar ? camera.target.map((c) => 1e4 * Math.round(c / 1e4)) : scenery.anchor;
     const view = camera.view(canvas.width, canvas.height, this.ratio, anchor);
     this.view = view;
@@ -126,7 +126,7 @@ export class Picture {
     scenery.drawSky(this.colours);
     scenery.drawTerrain(view, this.look, drawn.grid);
     this.entities.place(anchor, hidden, chosen);
-    this.entities.draw(view, { scale: this.scale, least: drawn.least ? LEAST_SIZE : 0, bright: this.look.bright }, drawn.wire);
+    this.entities.draw(view, { scale: this.scale, least: drawn.least ? MIN_SIZE : 0, bright: this.look.bright }, drawn.wire);
     if (drawn.shapes) {
       this.shapes.place(anchor);
       this.shapes.draw(view, false);

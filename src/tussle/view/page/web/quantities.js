@@ -9,7 +9,7 @@ import { OF_TEAMS, steps } from './series.js';
 /** Colours of entities in one plot, told apart with every kind of colour vision. */
 const COLOURS = ['#4aa3df', '#e8743b', '#2fb38a', '#d9ae1f', '#b59ad6', '#e05a9c'];
 /** Lines of one plot. */
-const MOST_LINES = 12;
+const MAX_LINES = 12;
 /** Titles of quantities of teams. @type {Record<string, string>} */
 const TITLES = { left: 'entities left', born: 'entities born' };
 
@@ -129,7 +129,7 @@ export class QuantityPanel {
 
   /** @param {Plot} plot @param {Omit<Line, 'row' | 'value'>} line */
   addLine(plot, line) {
-    if (plot.lines.length >= MOST_LINES || plot.lines.some(({ team, id }) => team === line.team && id === line.id)) return;
+    if (plot.lines.length >= MAX_LINES || plot.lines.some(({ team, id }) => team === line.team && id === line.id)) return;
     const [swatch, value] = [element('i', line.isDashed ? 'is-dashed' : ''), element('b')];
     swatch.style.setProperty('--line-colour', line.colour);
     const row = element('li', '', '', swatch, element('span', '', line.label), value);

@@ -8,9 +8,9 @@ import { LEVEL, Model } from './models.js';
 import { Renderer } from './renderer.js';
 
 /** Lines between entities; of more, the shortest are drawn. */
-const MOST_LINKS = 5000;
+const MAX_LINKS = 5000;
 /** Pairs in reach that are looked at. */
-const MOST_PAIRS = 400000;
+const MAX_PAIRS = 400000;
 const SIDES = 40;
 
 export class Reach {
@@ -83,14 +83,14 @@ export const linkOpacity = (n) => between(4 / Math.sqrt(n || 1), 0.1, 0.45);
 /** Opacity of so many cones. @param {number} n */
 export const coneOpacity = (n) => between(0.25 / Math.sqrt(n || 1), 0.012, 0.13);
 
-/** Pairs of places that are no farther apart than a reach [m], at most MOST_LINKS. @param {number[][]} places @param {number} reach */
+/** Pairs of places that are no farther apart than a reach [m], at most MAX_LINKS. @param {number[][]} places @param {number} reach */
 export function pairsWithin(places, reach) {
   /** @type {Map<string, number[][]>} */
   const cells = new Map();
   /** @type {[number[], number[], number][]} */
   const found = [];
   for (const here of places) {
-    if (!(reach > 0) || found.length >= MOST_PAIRS) break;
+    if (!(reach > 0) || found.length >= MAX_PAIRS) break;
     const [x, y, z] = here.map((c) => Math.floor(c / reach));
     for (let k = 0; k < 27; k++) {
       for (const other of cells.get(`${x + (k % 3) - 1} ${y + (Math.floor(k / 3) % 3) - 1} ${z + Math.floor(k / 9) - 1}`) || []) {
@@ -102,7 +102,7 @@ export function pairsWithin(places, reach) {
     if (!cells.has(own)) cells.set(own, []);
     cells.get(own).push(here);
   }
-  return found.length > MOST_LINKS ? found.sort((a, b) => a[2] - b[2]).slice(0, MOST_LINKS) : found;
+  return found.length > MAX_LINKS ? found.sort((a, b) => a[2] - b[2]).slice(0, MAX_LINKS) : found;
 }
 
 /** What lies within 1 m of the origin and half an angle off the x axis: its skin, with the round end. @param {number} angle radians */

@@ -10,10 +10,10 @@ import { lastNotAfter, lastWhere } from './ordered.js';
 import { OF_TEAMS } from './series.js';
 
 /** States that are kept unpacked, at some 45 bytes each; the chunks that were used last stay. */
-const MOST_STATES = 4e6;
+const MAX_STATES = 4e6;
 
 /** Groups of frames whose shapes, and chunks whose columns, are kept. */
-const MOST_SHAPES = 4;
+const MAX_SHAPES = 4;
 
 export class Recorded extends Layer {
   /** @param {PageData} page @param {Source} source @param {() => void} changed @param {(error: Error) => void} failed a chunk cannot be read */
@@ -85,7 +85,7 @@ export class Recorded extends Layer {
     let nStates = 0;
     for (const each of this.chunks.values()) nStates += each.nStates;
     for (const [oldest, each] of this.chunks) {
-      if (nStates <= MOST_STATES || this.chunks.size <= 2) break;
+      if (nStates <= MAX_STATES || this.chunks.size <= 2) break;
       nStates -= each.nStates;
       this.chunks.delete(oldest);
     }
@@ -95,7 +95,7 @@ export class Recorded extends Layer {
   /** The oldest frame that can be kept unpacked together with a frame. @param {number} frame */
   oldestBeside(frame) {
     const { chunks, nStates } = this.page;
-    const most = Math.max(1, Math.floor((0.6 * MOST_STATES * chunks.length) / Math.max(1, nStates)));
+    const most = Math.max(1, Math.floor((0.6 * MAX_STATES * chunks.length) / Math.max(1, nStates)));
     return chunks[Math.max(0, this.chunkOf(frame) - most + 1)][0];
   }
 
@@ -140,7 +140,7 @@ export class Recorded extends Layer {
     }
     this.shapes.set(number, found);
     this.reading.delete(name);
-    if (this.shapes.size > MOST_SHAPES) this.shapes.delete(this.shapes.keys().next().value);
+    if (this.shapes.size > MAX_SHAPES) this.shapes.delete(this.shapes.keys().next().value);
     this.changed();
   }
 
@@ -160,7 +160,7 @@ export class Recorded extends Layer {
     const [first, last] = this.page.chunks[number];
     this.columns.set(number, new ColumnChunk(await this.source.blob(name), first, last - first + 1, this.page.columns));
     this.reading.delete(name);
-    if (this.columns.size > MOST_SHAPES) this.columns.delete(this.columns.keys().next().value);
+    if (this.columns.size > MAX_SHAPES) this.columns.delete(this.columns.keys().next().value);
     this.changed();
   }
 

@@ -11,7 +11,7 @@ import { Renderer } from './renderer.js';
 export const AXES = [['E', [226, 106, 92]], ['N', [92, 176, 112]], ['U', [94, 150, 232]]];
 const NOBODY = [150, 160, 172];
 /** Least distance of grid lines [pixels] where the view looks at. */
-const LEAST_CELL = 14;
+const MIN_CELL = 14;
 const CIRCLE = 64;
 
 export class Scenery {
@@ -86,7 +86,7 @@ export class Scenery {
   /** Distance of the narrowest grid lines, and how clearly they are seen, 0 to 1. @param {View} view */
   cell(view) {
     const distance = Math.max(view.distance, Math.abs(view.eye[2] - this.data.ground));
-    const wanted = Math.log10((LEAST_CELL * distance * view.perPixel) / this.data.gridStep);
+    const wanted = Math.log10((MIN_CELL * distance * view.perPixel) / this.data.gridStep);
     const power = Math.ceil(wanted);
     return { spacing: this.data.gridStep * 10 ** power, nearer: between((power - wanted) * 1.6, 0, 1) };
   }

@@ -7,7 +7,7 @@ import { LEVEL, Model } from './models.js';
 import { Renderer } from './renderer.js';
 
 /** Least size of a point [pixels]. */
-const LEAST_POINT = 4;
+const MIN_POINT = 4;
 /** Numbers of a row of a kind. @type {Record<string, number>} */
 const ROW_SIZES = { points: 7, lines: 9, arrows: 9, sphere: 14, box: 14, cone: 14 };
 const BOX = {
@@ -79,7 +79,7 @@ export class Shapes {
   draw(view, isSeenThrough) {
     for (const { kind, opacity, model } of this.groups.values()) {
       const isPoint = kind === 'points';
-      if (opacity < 1 === isSeenThrough) model.draw(view, { opacity, least: isPoint ? LEAST_POINT : 0, flatness: isPoint ? 0.7 : 0.25 });
+      if (opacity < 1 === isSeenThrough) model.draw(view, { opacity, least: isPoint ? MIN_POINT : 0, flatness: isPoint ? 0.7 : 0.25 });
     }
     for (const { model, numbers } of this.own) {
       const opacity = numbers[10];

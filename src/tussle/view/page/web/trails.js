@@ -7,7 +7,7 @@ import { Lines } from './lines.js';
 import { Renderer } from './renderer.js';
 
 /** Points of all trails together; with more, each has fewer. */
-const MOST_POINTS = 120000;
+const MAX_POINTS = 120000;
 /** Length of the chosen entity's trail where the others have none [s]. */
 export const TRAIL_OF_CHOSEN = 10;
 /** Lengths of trails that can be chosen [s]. */
@@ -27,7 +27,7 @@ export class Trails extends Lines {
     const n = seconds ? layer.shown.n : 1;
     this.begin(anchor);
     if (seconds || chosen) {
-      layer.trails(span, Math.max(4, Math.floor(MOST_POINTS / Math.max(1, n))), seconds ? null : [chosen], (id, places, times) => {
+      layer.trails(span, Math.max(4, Math.floor(MAX_POINTS / Math.max(1, n))), seconds ? null : [chosen], (id, places, times) => {
         const slot = layer.slotOf(id);
         const team = slot >= 0 ? layer.shown.team[slot] : layer.teamOf(id).id;
         if (hidden.has(team)) return;

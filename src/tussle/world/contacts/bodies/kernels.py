@@ -16,7 +16,7 @@ from tussle.numeric.kernel import device, kernel, lean_device, lean_routine
 from tussle.numeric.rigid_body import add, cross, scale
 from tussle.world.contacts.boxes.kernels import (
     CONTACT,
-    MOST_FOUND,
+    MAX_FOUND,
     box_contacts,
     dot,
     minus,
@@ -29,7 +29,7 @@ ITEM = 16
 SLACK = 0.01
 """Gap below which bodies touch, and overlap that is left alone, relative to the size of the smaller one. Without it, a body at rest
 would lose and find its contacts in turn."""
-MOST_ADVANCES = 24
+MAX_ADVANCES = 24
 BOX_REACH = 0.25
 """Boxes are not followed, but are kept apart from this gap on, relative to the smallest half length, if they approach fast enough."""
 UP = (0.0, 0.0, 1.0)
@@ -116,7 +116,7 @@ def round_contact(first, a, second, b, motion, found, n):
     p, q, way, distance = segment_gap(first, a, second, b, offset)
     if distance - radius > slack:
         s, is_hit = 0.0, False
-        for _ in range(MOST_ADVANCES):
+        for _ in range(MAX_ADVANCES):
             s, is_over, is_hit = advanced(s, distance - radius, -dot(way, motion) / distance, radius)
             if is_over:
                 break
@@ -194,7 +194,7 @@ def ball_box_contact(ball, box, b, motion, found, n):
     point, normal, distance = point_of_box(box, b, offset)
     if distance - radius > SLACK * min(radius, size_of(box, b)):
         s, is_hit = 0.0, False
-        for _ in range(MOST_ADVANCES):
+        for _ in range(MAX_ADVANCES):
             s, is_over, is_hit = advanced(s, distance - radius, -dot(normal, motion), radius)
             if is_over:
                 break
@@ -255,7 +255,7 @@ def find_pairs(shapes, pairs, motion, ints, contacts):
     items, sizes = shapes
     row, other = pairs
     vel, dt = motion
-    found = np.empty((MOST_FOUND, CONTACT))
+    found = np.empty((MAX_FOUND, CONTACT))
     scratch = (
         np.empty((8, 3)), np.empty((3, 3)), np.empty((8, 3)), np.empty((3, 3)),
         np.empty((16, 3)), np.empty((16, 3)), np.empty((16, 3)),

@@ -20,7 +20,7 @@ from tussle.numeric.rigid_body import add, cross, scale
 
 CONTACT = 11
 """Numbers of a contact: normal, two arms, gap, feature."""
-MOST_FOUND = 64
+MAX_FOUND = 64
 """Largest number of contacts of one body with another, or with the scene."""
 PREFER_FACES = 0.02
 """Edges must separate by this much more than a face, relative to the smallest half length: faces give more points, and steadier ones."""

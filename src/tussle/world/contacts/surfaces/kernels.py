@@ -14,13 +14,13 @@ from tussle.numeric.rigid_body import add, cross, scale
 from tussle.numeric.triangle import closest_weights
 from tussle.world.contacts.bodies.kernels import (
     BOX_REACH,
-    MOST_ADVANCES,
+    MAX_ADVANCES,
     SLACK,
     advanced,
     size_of,
     unit_or,
 )
-from tussle.world.contacts.boxes.kernels import CONTACT, MOST_FOUND, box_contacts, dot, minus, put, vector
+from tussle.world.contacts.boxes.kernels import CONTACT, MAX_FOUND, box_contacts, dot, minus, put, vector
 
 TRIANGLE = 13
 """Numbers of a triangle: corners, unit normal, 1 if only the side of the normal is outside."""
@@ -58,7 +58,7 @@ def ball_triangle_contact(place, radius, center, t, k, motion, found, n, feature
     point, normal, distance = point_of_triangle(t, k, start)
     if distance - radius > SLACK * radius:
         s, is_hit = 0.0, False
-        for _ in range(MOST_ADVANCES):
+        for _ in range(MAX_ADVANCES):
             s, is_over, is_hit = advanced(s, distance - radius, -dot(normal, motion), radius)
             if is_over:
                 break
@@ -280,7 +280,7 @@ def find_surfaces(bodies, motion, planes, tree, field, ints, contacts):
     vel, dt, world = motion
     bounds, links, roots, triangles = tree
     height, grid = field
-    found, stack = np.empty((MOST_FOUND, CONTACT)), np.empty(STACK, np.int64)
+    found, stack = np.empty((MAX_FOUND, CONTACT)), np.empty(STACK, np.int64)
     corners, axes, edges = np.empty((8, 3)), np.empty((3, 3)), np.empty((3, 3))
     inner = (
         corners, axes, edges,

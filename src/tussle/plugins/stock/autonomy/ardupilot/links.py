@@ -13,10 +13,10 @@ from tussle.plugins.links.autopilots.frames import VehicleState
 from tussle.plugins.links.autopilots.link import AutopilotLink, bound
 from tussle.plugins.stock.autonomy.ardupilot import wire
 
-MOST_PACKETS = 1000
+MAX_PACKETS = 1000
 """Packets in one step, refused ones included, beyond which nothing more is read: the buffer of a socket holds some hundreds."""
-LARGEST = 2048
-"""More bytes than any packet has."""
+MAX_PACKET = 2048
+"""Size of the receive buffer [B], larger than any packet."""
 UNHEARD_PERIOD = 0.1
 """Time after which a state that nobody listened to is sent again [s]."""
 
@@ -61,16 +61,16 @@ class UdpLink(AutopilotLink):
         """Read all packets."""
         while not self.failure:
             try:
-                data, place = self._in.recvfrom(LARGEST)
+                data, place = self._in.recvfrom(MAX_PACKET)
             except BlockingIOError:
                 return
             except OSError as error:
                 self.fail(f"nothing can be received: {error.strerror}")
                 return
             self._n_packets += 1
-            if self._n_packets > MOST_PACKETS:
+            if self._n_packets > MAX_PACKETS:
                 self.fail(
-                    f"more than {MOST_PACKETS} packets in one step, the last from {_at(place)}{self._remark()}"
+                    f"more than {MAX_PACKETS} packets in one step, the last from {_at(place)}{self._remark()}"
                 )
             elif self._is_stranger(place):
                 self._refused = f"a packet from {_at(place)}"

@@ -8,7 +8,7 @@ import numpy as np
 
 from tussle.api import GroupView, HistoricAttributes, Param, State
 from tussle.api.channel_map import ChannelMapParam
-from tussle.plugins.links.autopilots.link import MOST_PORT, resolved
+from tussle.plugins.links.autopilots.link import MAX_PORT, resolved
 from tussle.plugins.links.autopilots.plugin import Autopilot
 from tussle.plugins.stock.autonomy.ardupilot import wire
 from tussle.plugins.stock.autonomy.ardupilot.links import JsonLink, ScrimmageLink, UdpLink
@@ -56,26 +56,26 @@ class ArduPilot(Autopilot):
     )
     to_ardupilot_ip = Param("127.0.0.1", doc="Where ArduPilot is, for the protocol scrimmage.")
     to_ardupilot_port = Param(
-        5003, structural=True, ge=1, le=MOST_PORT, doc="Port of ArduPilot that takes states."
+        5003, structural=True, ge=1, le=MAX_PORT, doc="Port of ArduPilot that takes states."
     )
     from_ardupilot_port = Param(
-        5002, structural=True, ge=1, le=MOST_PORT, doc="Port of tussle that takes servo packets."
+        5002, structural=True, ge=1, le=MAX_PORT, doc="Port of tussle that takes servo packets."
     )
     ardupilot_port_base = Param(
         0,
         structural=True,
         ge=0,
-        le=MOST_PORT,
+        le=MAX_PORT,
         doc="If not 0, the ports of each vehicle are counted from here.",
     )
     port_instance_multiplier = Param(
-        10, structural=True, ge=0, le=MOST_PORT, doc="Ports are higher by this for each id."
+        10, structural=True, ge=0, le=MAX_PORT, doc="Ports are higher by this for each id."
     )
     json_port = Param(
         9002,
         structural=True,
         ge=1,
-        le=MOST_PORT,
+        le=MAX_PORT,
         doc="Port of tussle for the first vehicle, for the protocol json.",
     )
     listen_ip = Param("127.0.0.1", doc="Address of this machine at which servo packets are taken.")

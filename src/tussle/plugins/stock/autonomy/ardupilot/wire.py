@@ -64,11 +64,11 @@ def decode_servos(data: bytes) -> ServoFrame:
 
 def encode_json(state: VehicleState) -> bytes:
     """A state, by the protocol "json"."""
-    said = {
+    fields = {
         "timestamp": state.t, "imu": {"gyro": state.rate, "accel_body": state.force}, "position": state.position,
         "attitude": state.euler, "quaternion": state.quat, "velocity": state.velocity,
     }  # fmt: skip
-    return f"\n{json.dumps(said, separators=(',', ':'))}\n".encode()
+    return f"\n{json.dumps(fields, separators=(',', ':'))}\n".encode()
 
 
 def decode_frame(data: bytes) -> ServoFrame:

@@ -21,7 +21,7 @@ TOKEN = re.compile(
     re.VERBOSE | re.DOTALL | re.MULTILINE,
 )
 KEYWORDS = ("node", "edge", "graph", "digraph", "subgraph", "strict")
-MOST_NESTED = 50
+MAX_NESTED = 50
 """Maximum nesting of subgraphs."""
 
 
@@ -142,8 +142,8 @@ class _Reader:
         """Statements in braces. Returns their nodes."""
         self._expect("{")
         self.depth += 1
-        if self.depth > MOST_NESTED:
-            raise self._refuse(f"at most {MOST_NESTED} nested subgraphs")
+        if self.depth > MAX_NESTED:
+            raise self._refuse(f"at most {MAX_NESTED} nested subgraphs")
         inside: dict[str, None] = {}
         while not self._accept("}"):
             inside.update(dict.fromkeys(self._statement(defaults)))

@@ -7,7 +7,7 @@ import struct
 
 EVENT = struct.Struct("<IhBB")  # time [ms], value, type, number (linux/joystick.h)
 BUTTON, AXIS, INITIAL = 1, 2, 0x80
-MOST_EVENTS = 64  # per read
+MAX_EVENTS = 64  # per read
 
 
 class JoystickDevice:
@@ -37,7 +37,7 @@ class JoystickDevice:
         """
         while True:
             try:
-                data = os.read(self.file, MOST_EVENTS * EVENT.size)
+                data = os.read(self.file, MAX_EVENTS * EVENT.size)
             except BlockingIOError:
                 return
             for _, value, kind, number in EVENT.iter_unpack(data[: len(data) // EVENT.size * EVENT.size]):
@@ -45,7 +45,7 @@ class JoystickDevice:
                     self.axes[number] = value
                 elif kind & ~INITIAL == BUTTON:
                     (self.pressed.add if value else self.pressed.discard)(number)
-            if len(data) < MOST_EVENTS * EVENT.size:
+            if len(data) < MAX_EVENTS * EVENT.size:
                 return
 
     def close(self) -> None:

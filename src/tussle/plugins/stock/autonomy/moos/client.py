@@ -16,9 +16,9 @@ RETRY = 0.1
 """Time between attempts to connect [s]."""
 TIMING_PERIOD = 1.0
 """Time between the signs of life that a client sends [s]."""
-LONGEST_ATTEMPT = 2.0
+MAX_ATTEMPT = 2.0
 """Longest wait for an answer before another attempt [s]."""
-MOST_PER_SECOND = 2000
+MAX_PER_SECOND = 2000
 """Messages per second, and at once, beyond which a peer is not listened to. A helm sends some tens."""
 CLOSED = "the connection was closed"
 
@@ -69,7 +69,7 @@ class MoosClient:
         self._received = bytearray()
         self._sending = threading.Lock()
         self._is_closing = threading.Event()
-        self._allowance = float(MOST_PER_SECOND)
+        self._allowance = float(MAX_PER_SECOND)
         self._heads: tuple[bytes, bytes] = (b"", b"")
         self._thread = threading.Thread(target=self._run, name=f"MOOS {host}:{port}", daemon=True)
 
@@ -92,12 +92,12 @@ class MoosClient:
         with suppress(OSError):  # it is closed already
             if self._socket:
                 self._socket.shutdown(socket.SHUT_RDWR)
-        self._thread.join(2.0 * LONGEST_ATTEMPT)  # longer only while the name of the host is looked up
+        self._thread.join(2.0 * MAX_ATTEMPT)  # longer only while the name of the host is looked up
 
     def allow(self, n: int) -> None:
         """Let the peer send this many messages more than it may send in its time."""
         with self.changed:
-            self._allowance = min(self._allowance + n, MOST_PER_SECOND)
+            self._allowance = min(self._allowance + n, MAX_PER_SECOND)
 
     def number(self, tail: bytes) -> bytes:
         """The message that sets a variable to a number; tail: see `wire.encode_tail`."""
@@ -158,7 +158,7 @@ class MoosClient:
         """Connect, trying again until there is a connection; returns the socket."""
         while not self._is_closing.is_set():
             try:
-                self._socket = socket.create_connection((self.host, self.port), LONGEST_ATTEMPT)
+                self._socket = socket.create_connection((self.host, self.port), MAX_ATTEMPT)
                 self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
             except OSError as error:
                 self.trouble = error.strerror or str(error)
@@ -182,7 +182,7 @@ class MoosClient:
         hello = wire.packet([wire.joined(head, wire.encode_tail("asynchronous", self.name, time.time()))])
         connection.sendall(wire.PROTOCOL + hello)
         self._received.clear()
-        limit, messages = time.monotonic() + LONGEST_ATTEMPT, None
+        limit, messages = time.monotonic() + MAX_ATTEMPT, None
         while messages is None:
             connection.settimeout(max(limit - time.monotonic(), 0.001))
             data = b"" if self._is_closing.is_set() else connection.recv(4096)
@@ -224,12 +224,12 @@ class MoosClient:
     def _deliver(self, elapsed: float) -> None:
         """Pass on the mail of all packets that are complete."""
         with self.changed:
-            self._allowance = min(self._allowance + MOST_PER_SECOND * elapsed, MOST_PER_SECOND)
+            self._allowance = min(self._allowance + MAX_PER_SECOND * elapsed, MAX_PER_SECOND)
             while (messages := wire.take_packet(self._received)) is not None:
                 mail = [message for message in messages if message.kind == wire.NOTIFY]
                 self._allowance -= len(mail)
                 if self._allowance < 0.0:
-                    raise ConnectionError(f"more than {MOST_PER_SECOND} messages per second")
+                    raise ConnectionError(f"more than {MAX_PER_SECOND} messages per second")
                 for message in mail:
                     self._receive(message)
             self.changed.notify_all()

@@ -10,7 +10,7 @@ from tussle import documents
 from tussle.errors import ParameterError
 
 HOST, PORT = "127.0.0.1", 9000
-"""Where a MOOSDB is unless something else is said."""
+"""Host and port of a MOOSDB where neither parameters nor a mission file name them."""
 
 
 @dataclass(frozen=True)
@@ -37,10 +37,10 @@ def community_of(values: dict[str, Any]) -> MoosCommunity:
         ParameterError: The file cannot be read, or a value in it is not allowed.
     """
     path = values["moos_mission_file"]
-    said = _said(Path(path).expanduser()) if path else {}
+    settings = _read_settings(Path(path).expanduser()) if path else {}
 
     def number(key: str, least: float, most: float, usual: float) -> float:
-        text = said.get(key.lower(), str(usual))
+        text = settings.get(key.lower(), str(usual))
         try:
             found = float(text)
         except ValueError:
@@ -51,24 +51,24 @@ def community_of(values: dict[str, Any]) -> MoosCommunity:
             )
         return found
 
-    host = values["moos_host"] or said.get("serverhost", HOST)
+    host = values["moos_host"] or settings.get("serverhost", HOST)
     return MoosCommunity(
         HOST if host.lower() == "localhost" else host,
         values["moos_port"] or int(number("ServerPort", 1, 65535, PORT)),
-        values["moos_community"] or said.get("community", ""),
+        values["moos_community"] or settings.get("community", ""),
         values["moos_time_warp"] or number("MOOSTimeWarp", 0.001, 1000.0, 1.0),
     )
 
 
-def _said(path: Path) -> dict[str, str]:
+def _read_settings(path: Path) -> dict[str, str]:
     """Values of a mission file outside of its blocks, by names in lower case; // begins a comment, and the first line counts."""
-    said: dict[str, str] = {}
+    settings: dict[str, str] = {}
     depth = 0
     for line in documents.read_text(path, ParameterError).splitlines():
         text = line.partition("//")[0].strip()
         key, is_value, value = text.partition("=")
         name = key.strip().lower()
         if is_value and not depth and name != "processconfig":
-            said.setdefault(name, value.strip().strip('"'))
+            settings.setdefault(name, value.strip().strip('"'))
         depth += text.count("{") - text.count("}")
-    return said
+    return settings

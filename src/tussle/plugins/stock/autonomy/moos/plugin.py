@@ -19,7 +19,7 @@ from tussle.plugins.stock.autonomy.moos.mission_file import community_of
 from tussle.plugins.stock.autonomy.moos.vessel import Vessel
 
 NAVIGATION = ("NAV_X", "NAV_Y", "NAV_HEADING", "NAV_SPEED", "NAV_DEPTH")
-MOST_PORT = 65535
+MAX_PORT = 65535
 LAUNCH = "launch.sh"
 """Script beside the missions of MOOS that writes them from templates and starts the communities."""
 
@@ -58,13 +58,11 @@ class MOOSAutonomy(Autonomy):
         "", doc="Mission file of MOOS, for ServerHost, ServerPort, Community and MOOSTimeWarp; may be empty."
     )
     moos_host = Param("", doc="Where the MOOSDB is; empty for that of the file, or 127.0.0.1.")
-    moos_port = Param(
-        0, structural=True, ge=0, le=MOST_PORT, doc="Its port; 0 for that of the file, or 9000."
-    )
+    moos_port = Param(0, structural=True, ge=0, le=MAX_PORT, doc="Its port; 0 for that of the file, or 9000.")
     port_step = Param(
-        0, structural=True, ge=0, le=MOST_PORT, doc="The port is higher by this for each id above 1."
+        0, structural=True, ge=0, le=MAX_PORT, doc="The port is higher by this for each id above 1."
     )
-    world_step = Param(0, structural=True, ge=0, le=MOST_PORT, doc="The same for each world of a stack.")
+    world_step = Param(0, structural=True, ge=0, le=MAX_PORT, doc="The same for each world of a stack.")
     moos_community = Param("", doc="Name that the community must have; empty for that of the file, or any.")
     moos_time_warp = Param(
         0.0, structural=True, ge=0.0, le=1000.0, doc="Simulated time over time; 0 for that of the file, or 1."
@@ -124,8 +122,8 @@ class MOOSAutonomy(Autonomy):
         found = community_of(values)
         port = found.port + values["port_step"] * (row.id - 1) + values["world_step"] * row.world
         place, owners = (found.host, port), row.shared("MOOS", Communities)
-        if place in owners or port > MOST_PORT:
-            whose = f"is the community of {owners[place]}" if place in owners else f"is above {MOST_PORT}"
+        if place in owners or port > MAX_PORT:
+            whose = f"is the community of {owners[place]}" if place in owners else f"is above {MAX_PORT}"
             raise ParameterError(
                 f"port {port} of {found.host} {whose}; each vehicle has a community of its own: give each its mission file "
                 f"of MOOS or its moos_port, or set port_step and, for several worlds, world_step"
@@ -154,7 +152,7 @@ class MOOSAutonomy(Autonomy):
             vessel.await_helm(limit)
         if not self.lockstep:
             for vessel in vessels:
-                vessel.await_clock(g.dt)
+                vessel.await_clock(float(g.t[0]), g.dt)
         self._publish(g, vessels)
         if self.lockstep:
             limit = time.monotonic() + self.timeout

@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable
 
 from tussle.declare import texts
+from tussle.pacing import Pace
 from tussle.plugins.stock.autonomy.moos import wire
 from tussle.plugins.stock.autonomy.moos.client import MoosClient
 from tussle.plugins.stock.autonomy.moos.mission_file import MoosCommunity
@@ -14,11 +15,9 @@ from tussle.plugins.stock.autonomy.moos.mission_file import MoosCommunity
 DESIRED = ("DESIRED_HEADING", "DESIRED_SPEED", "DESIRED_DEPTH")
 STATE, STEP, DONE = "IVPHELM_STATE", "TUSSLE_STEP", "TUSSLE_STEP_DONE"
 DEPLOYMENT = {"DEPLOY": "true", "RETURN": "false", "MOOS_MANUAL_OVERRIDE": "false"}
-"""What a helm is told when it is heard for the first time."""
+"""Variables that are sent to a helm after its first message."""
 MALCONFIG = "MALCONFIG"
 """State of a helm that does not understand its configuration; it never steers."""
-CATCH_UP = 0.2
-"""How far a simulation may lag behind the clock before the lag is forgotten [s]."""
 PER_STEP = 32
 """Messages that a helm may send for each step that it answers."""
 
@@ -50,11 +49,11 @@ class Vessel:
     ) -> None:
         self.timeout, self.lockstep, self.time_warp = timeout, lockstep, community.time_warp
         self.reported, self._release = -math.inf, release
-        self._due, self._goes_on = 0.0, on_loss == "go_on"
+        self._pace, self._goes_on = Pace(self.time_warp), on_loss == "go_on"
         self._sent: list[bytes] = []
         self._has_begun, self._n_lost = False, 0
         self._state = ""
-        self._heard = time.monotonic()
+        self._last_message = time.monotonic()
         self._step = -1.0
         self._wanted: dict[str, float] = {}
         self._answer: dict[str, float] | None = None
@@ -82,13 +81,12 @@ class Vessel:
             self._await(lambda: bool(self._state), limit, "no helm has been heard")
             self._has_begun = True
 
-    def await_clock(self, dt: float) -> None:
-        """Wait until the clock has moved by dt of the world since the last call."""
-        now = time.monotonic()
-        self._due = max(self._due + dt / self.time_warp, now - CATCH_UP) if self._due else now
+    def await_clock(self, t: float, dt: float) -> None:
+        """Wait until simulated time t is due, where the last call was for t - dt."""
+        left = self._pace.due_in(t, dt)
         with self.client.changed:
-            self.client.changed.wait_for(lambda: bool(self.failure), max(self._due - now, 0.0))
-        if self._state and time.monotonic() - self._heard > self.timeout:
+            self.client.changed.wait_for(lambda: bool(self.failure), max(left, 0.0))
+        if self._state and time.monotonic() - self._last_message > self.timeout:
             self.client.fail(f"the helm has been silent for {self.timeout:g} s{self._state_text()}")
 
     def await_answer(self, limit: float) -> None:
@@ -163,16 +161,20 @@ class Vessel:
             if isinstance(value, str) or not math.isfinite(value):
                 raise ConnectionError(f"{message.source} says {key} = {value!r}; it takes a finite number")
             if key in DESIRED:
-                self._follow(message.source, key)
+                self._accept_helm(message.source, key)
                 self._wanted[key] = value
             elif value == self._step and self._answer is None:
                 self._answer = dict(self._wanted)
                 self.client.allow(PER_STEP)
         if self._state != MALCONFIG:
-            self._heard = time.monotonic()
+            self._last_message = time.monotonic()
 
-    def _follow(self, source: str, key: str) -> None:
-        """One helm may take over from another one, but two do not steer together."""
+    def _accept_helm(self, source: str, key: str) -> None:
+        """Accept a command of a helm: a new helm may take over, but two may not alternate.
+
+        Raises:
+            ConnectionError: A former helm sets a variable again.
+        """
         if source != self._source:
             if source in self._former:
                 raise ConnectionError(f"{source} and {self._source} both set {key}")

@@ -25,8 +25,8 @@ HEADER = struct.Struct("<iib")
 START = struct.Struct("<iicc")  # bytes, number, kind, data
 LENGTH = struct.Struct("<i")
 NUMBERS = struct.Struct("<ddd")
-LEAST_MESSAGE = START.size + 5 * LENGTH.size + NUMBERS.size
-MOST_BYTES = 1 << 20
+MIN_MESSAGE = START.size + 5 * LENGTH.size + NUMBERS.size
+MAX_BYTES = 1 << 20
 """Largest packet that is read."""
 
 
@@ -97,9 +97,9 @@ def take_packet(received: bytearray) -> list[MoosMessage] | None:
     if len(received) < HEADER.size:
         return None
     length, n, is_compressed = HEADER.unpack_from(received)
-    if not HEADER.size <= length <= MOST_BYTES or not 0 <= n * LEAST_MESSAGE <= length or is_compressed:
+    if not HEADER.size <= length <= MAX_BYTES or not 0 <= n * MIN_MESSAGE <= length or is_compressed:
         raise ValueError(
-            f"a packet of {length} bytes with {n} messages; it takes at most {MOST_BYTES}, uncompressed"
+            f"a packet of {length} bytes with {n} messages; it takes at most {MAX_BYTES}, uncompressed"
         )
     if len(received) < length:
         return None
@@ -113,11 +113,11 @@ def take_packet(received: bytearray) -> list[MoosMessage] | None:
 
 def _decode(data: bytes, at: int) -> tuple[MoosMessage, int]:
     """A message of a packet, and where it ends."""
-    if len(data) - at < LEAST_MESSAGE:
+    if len(data) - at < MIN_MESSAGE:
         raise ValueError("a message is cut short")
     length, _, kind, sort = START.unpack_from(data, at)
     end = at + length
-    if not LEAST_MESSAGE <= length <= len(data) - at or sort not in b"DSB":
+    if not MIN_MESSAGE <= length <= len(data) - at or sort not in b"DSB":
         raise ValueError(f"a message of {length} bytes with data of the kind {sort!r}")
     texts, at = [], at + START.size
     for _ in range(4):

@@ -15,10 +15,10 @@ from tussle.plugins.links.autopilots.frames import VehicleState
 from tussle.plugins.links.autopilots.link import AutopilotLink, bound
 from tussle.plugins.stock.autonomy.px4.sensors import SensorSuite
 
-MOST_BYTES = 1 << 20
-"""Bytes in one step beyond which nothing more is read, and unsent bytes beyond which the autopilot counts as stuck."""
+MAX_BYTES = 1 << 20
+"""Largest number of bytes read in one step, and of unsent bytes before the autopilot counts as stuck."""
 SEND_BUFFER = 1 << 16
-"""Bytes that the system keeps for an autopilot that does not read."""
+"""Size of the system's send buffer [B]."""
 FREEWHEEL_STEP = 4000
 """PX4's time between two messages while it starts [us]: its usual 250 Hz."""
 LOCKSTEP_FLAG = 1
@@ -111,8 +111,8 @@ class Px4Link(AutopilotLink):
                 self.fail("the connection was closed")
                 return
             self._n_read += len(data)
-            if self._n_read > MOST_BYTES:
-                self.fail(f"more than {MOST_BYTES} bytes in one step")
+            if self._n_read > MAX_BYTES:
+                self.fail(f"more than {MAX_BYTES} bytes in one step")
                 return
             for message in self._mav.parse_buffer(data) or ():
                 self._take(message)
@@ -219,7 +219,7 @@ class Px4Link(AutopilotLink):
             try:
                 n = self._socket.send(self._unsent)
             except BlockingIOError:
-                if len(self._unsent) > MOST_BYTES:
+                if len(self._unsent) > MAX_BYTES:
                     self.fail("it does not read what is sent")
                 return
             except OSError as error:

@@ -9,7 +9,7 @@ import numpy as np
 from tussle.api import GroupView, Param
 from tussle.api.channel_map import ChannelMapParam
 from tussle.errors import MissingExtraError
-from tussle.plugins.links.autopilots.link import MOST_PORT, resolved
+from tussle.plugins.links.autopilots.link import MAX_PORT, resolved
 from tussle.plugins.links.autopilots.plugin import Autopilot
 from tussle.plugins.stock.autonomy.px4.link import Px4Link
 from tussle.plugins.stock.autonomy.px4.sensors import SensorSuite
@@ -45,9 +45,9 @@ class PX4(Autopilot):
         doc="Rows [channel output control_min control_max channel_min channel_max factor].",
     )
     port = Param(
-        4560, structural=True, ge=1, le=MOST_PORT, doc="Port for PX4's instance 0, the vehicle with the id 1."
+        4560, structural=True, ge=1, le=MAX_PORT, doc="Port for PX4's instance 0, the vehicle with the id 1."
     )
-    port_step = Param(1, structural=True, ge=0, le=MOST_PORT, doc="Ports are higher by this for each id.")
+    port_step = Param(1, structural=True, ge=0, le=MAX_PORT, doc="Ports are higher by this for each id.")
     listen_ip = Param("127.0.0.1", doc="Address of this machine at which PX4 connects.")
     system_id = Param(
         1, structural=True, ge=1, le=255, doc="Number of the MAVLink system from which measurements come."

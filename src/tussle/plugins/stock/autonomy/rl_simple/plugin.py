@@ -13,7 +13,7 @@ import numpy as np
 
 from tussle.api import Autonomy, GroupView, Handle, HistoricAttributes, Input, Output, Param, Publish
 from tussle.declare.messages import RewardGiven
-from tussle.errors import ParameterError
+from tussle.errors import ParameterError, clipped
 from tussle.plugins.stock.autonomy.rl_simple.actors import Alternating, spaces_of
 from tussle.plugins.stock.autonomy.rl_simple.remote import ActorServer, RemoteActor
 
@@ -84,7 +84,7 @@ class RLSimple(Autonomy):
         name = type(self).__name__
         if self._is_alternating() and self.module != DEFAULT_MODULE:
             raise ParameterError(
-                f"{name}.module = {self.module[:80]!r}: a mission names no code; give the actor's file with --plugin-path, in which a "
+                f"{name}.module = {clipped(self.module)!r}: a mission names no code; give the actor's file with --plugin-path, in which a "
                 f"function such as {DEFAULT_FUNCTION}(action_space, obs_space, params) returns the actor, or omit module"
             )
 
@@ -147,7 +147,7 @@ class RLSimple(Autonomy):
         actor = type(self).actor_init(*spaces_of(*kinds, limit, n_observed), texts)
         if not callable(getattr(actor, "act", actor)):
             raise ParameterError(
-                f"{type(self).__name__}: {self._function()} returned {str(actor)[:80]!r}; it returns a callable or an object with act"
+                f"{type(self).__name__}: {self._function()} returned {clipped(str(actor))!r}; it returns a callable or an object with act"
             )
         return actor
 
@@ -171,7 +171,7 @@ class RLSimple(Autonomy):
             numbers = np.repeat(numbers, len(order))
         if len(numbers) != len(order) or not np.isfinite(numbers).all():
             raise ParameterError(
-                f"{type(self).__name__}: the actor of {self._function()} chose {str(action)[:80]}; an action has {len(order)} finite "
+                f"{type(self).__name__}: the actor of {self._function()} chose {clipped(str(action))}; an action has {len(order)} finite "
                 "numbers, first the discrete ones"
             )
         velocity = [0.0, 0.0, 0.0]

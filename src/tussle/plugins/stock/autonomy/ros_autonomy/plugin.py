@@ -221,7 +221,7 @@ class PublishedByROS(CommandedByROS):
             robot.publish_scan(points.data[3, begin:end], about, robot.link.stamp(about.time))
 
     def await_peers(self, g: GroupView) -> None:
-        """In lockstep, before the first step: wait until each robot has somebody who hears of its state and can answer."""
+        """Wait before the first step in lockstep until each robot has a node that reads its state and can answer."""
         robots: Any = self.robot
         if self.lockstep and not all(robot.inbox.n_received for robot in robots):
             why = "nobody has subscribed to /{0}/odom and publishes /{0}/cmd_vel"

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from tussle.errors import ParameterError, listed, nearest_name
+from tussle.errors import ParameterError, clipped, listed, nearest_name
 
 COLUMNS = ("id", "t", "x", "y", "z", "qw", "qx", "qy", "qz", "vx", "vy", "vz")
 
@@ -66,7 +66,9 @@ def _read(name: str, _changed: int, _size: int) -> TrajectoryTable:
     try:
         table = csv.read_csv(name)
     except (pa.ArrowInvalid, OSError) as error:
-        raise ParameterError(f"{name} is no table in CSV: {' '.join(str(error).split())[:200]}") from None
+        raise ParameterError(
+            f"{name} is no table in CSV: {clipped(' '.join(str(error).split()), 200)}"
+        ) from None
     missing = next((column for column in COLUMNS if column not in table.column_names), None)
     if missing:
         guess = nearest_name(missing, table.column_names)

@@ -13,12 +13,12 @@ from tussle.numeric import total
 from tussle.plugins.stock.controller.multirotor_controller_pid import kernels
 
 GAINS = "kp ki kd band"
-MOST_ROTORS = 8
+MAX_ROTORS = 8
 LOOPS = " ".join(
     f"{loop}_{k}" for loop in ("x", "y", "z", "p", "q", "yaw") for k in ("integral", "error", "has_error")
 )
-MIXER = " ".join(f"{load}_{i}" for i in range(MOST_ROTORS) for load in ("thrust", "roll", "pitch", "yaw"))
-LEAST_PIVOT = 1e-9
+MIXER = " ".join(f"{load}_{i}" for i in range(MAX_ROTORS) for load in ("thrust", "roll", "pitch", "yaw"))
+MIN_PIVOT = 1e-9
 
 
 def mixer_of(rotors: Any) -> list[list[float]]:
@@ -35,7 +35,7 @@ def mixer_of(rotors: Any) -> list[list[float]]:
     for i in n:
         pivot = max(range(i, 4), key=lambda k: abs(system[k][i]))
         system[i], system[pivot] = system[pivot], system[i]
-        if abs(system[i][i]) < LEAST_PIVOT:
+        if abs(system[i][i]) < MIN_PIVOT:
             raise ParameterError(
                 f"MultirotorControllerPID: {len(rows)} rotors at {[row[1:3] for row in rows]} cannot give every thrust, roll, pitch and "
                 "yaw moment; it takes at least four rotors, not in a line, that turn in both directions"
@@ -77,7 +77,7 @@ class MultirotorControllerPID(Controller):
     )
     desired_heading = Input(unit="rad", optional=True, doc="Desired heading, counter-clockwise from East.")
     motors = Output(
-        " ".join(f"motor_{i}" for i in range(MOST_ROTORS)),
+        " ".join(f"motor_{i}" for i in range(MAX_ROTORS)),
         unit="rad/s",
         doc="Speeds of the rotors; 0 beyond the last one.",
     )

@@ -5,26 +5,23 @@ from __future__ import annotations
 import ipaddress
 import math
 import socket
-import time
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from tussle.errors import ParameterError
+from tussle.pacing import Pace
 from tussle.plugins.stock.interaction.dis import pdu
 from tussle.world.geodesy import Origin
 
-MOST_DATAGRAMS = 20_000
+MAX_DATAGRAMS = 20_000
 """Read at once; with more, a flood would hold the simulation up."""
 RECEIVE_BUFFER = 4 * 1024 * 1024  # [byte] the system may give less
 BROADCAST = ".255"
-NAP = 0.05  # [s] longest wait before Ctrl-C is noticed
-CATCH_UP = 0.25  # [s] a larger delay is not caught up with
-MOST_BYTES = 65536
-MOST_SPEED, MOST_RATE = 1e5, 1e3
+MAX_BYTES = 65536
+MAX_SPEED, MAX_RATE = 1e5, 1e3
 """Largest component of a velocity [m/s] or acceleration [m/s^2], and of an angular velocity [rad/s], that is believed."""
-RATE_FIELDS = {"velocity": MOST_SPEED, "acceleration": MOST_SPEED, "angular_velocity": MOST_RATE}
+RATE_FIELDS = {"velocity": MAX_SPEED, "acceleration": MAX_SPEED, "angular_velocity": MAX_RATE}
 
 
 @dataclass
@@ -50,22 +47,24 @@ class ExerciseLink:
         port: Its port.
         listen_address: Address on which PDUs are received: an own one, a broadcast address, or with multicast that of the interface.
         listen_port: Port on which they are received; 0 for none.
+        warp: Simulated seconds per second of its pace.
 
     Attributes:
         remotes: Number of site, application and entity, as one -> entity of another simulator, in order of arrival.
         sent: Id of an entity of this world -> its last PDU.
         stamp: Timestamp of PDUs of this step.
+        pace: Its clock.
         n_sent: PDUs sent; n_received and n_refused likewise.
 
     Raises:
         ParameterError: An address is not known, or the port is taken.
     """
 
-    def __init__(self, address: str, port: int, listen_address: str, listen_port: int) -> None:
+    def __init__(self, address: str, port: int, listen_address: str, listen_port: int, warp: float) -> None:
         self.remotes: dict[int, Remote] = {}
         self.sent: dict[int, tuple[np.ndarray, float]] = {}
         self.n_sent = self.n_received = self.n_refused = 0
-        self.stamp, self._due, self._t = 0, 0.0, -math.inf
+        self.stamp, self.pace, self._t = 0, Pace(warp), -math.inf
         self._listens = bool(listen_port)
         self._place = (_resolved("address", address), port)
         own = _resolved("listen_address", listen_address)
@@ -108,9 +107,9 @@ class ExerciseLink:
             most: Largest number of remote entities.
         """
         found: list[bytes] = []
-        for _ in range(MOST_DATAGRAMS if self._listens else 0):
+        for _ in range(MAX_DATAGRAMS if self._listens else 0):
             try:
-                datagram = self.socket.recv(MOST_BYTES, socket.MSG_DONTWAIT)
+                datagram = self.socket.recv(MAX_BYTES, socket.MSG_DONTWAIT)
             except BlockingIOError:
                 break
             pdus, n_refused = pdu.split(datagram, exercise)
@@ -173,13 +172,6 @@ class ExerciseLink:
         for number in numbers:
             del self.sent[number]
 
-    def await_clock(self, dt: float, is_interrupted: Callable[[], bool]) -> None:
-        """Wait until the clock has moved by dt [s] since the last call."""
-        now = time.monotonic()
-        self._due = max(self._due + dt, now - CATCH_UP) if self._due else now
-        while (left := self._due - time.monotonic()) > 0.0 and not is_interrupted():
-            time.sleep(min(left, NAP))
-
     def end(self) -> None:
         """Say that all entities are gone, and close the socket; called when the simulation is closed."""
         try:
@@ -201,7 +193,7 @@ def _is_sound(records: np.ndarray, origin: Origin, reach: float) -> np.ndarray:
     """Whether each PDU, (n,), has finite numbers of a possible size and a location within reach [m] of the origin."""
     with np.errstate(invalid="ignore", over="ignore"):
         sound = np.isfinite(records["orientation"]).all(axis=1) & (
-            np.abs(records["orientation"]) < MOST_RATE
+            np.abs(records["orientation"]) < MAX_RATE
         ).all(axis=1)
         for name, most in RATE_FIELDS.items():
             sound &= (np.abs(records[name]) < most).all(axis=1)

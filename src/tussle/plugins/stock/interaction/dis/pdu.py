@@ -25,7 +25,7 @@ DEACTIVATED = 1 << 23
 """Bit of the appearance: the entity leaves the exercise."""
 ASCII = 1
 MARKING_CHARACTERS = 11
-MOST_ENTITY = 65533
+MAX_ENTITY = 65533
 """Largest number of an entity: 0, 65534 and 65535 have meanings of their own."""
 HOUR = 3600.0
 TYPE_FIELDS = ("kind", "domain", "country", "category", "subcategory", "specific", "extra")

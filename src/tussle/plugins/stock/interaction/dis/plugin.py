@@ -13,7 +13,7 @@ from tussle.numeric.quaternion import quat_rotate_inverse
 from tussle.plugins.stock.interaction.dis import pdu
 from tussle.plugins.stock.interaction.dis.link import ExerciseLink, Remote
 
-MOST_PORT = 65535
+MAX_PORT = 65535
 
 
 class DIS(Interaction):
@@ -38,12 +38,12 @@ class DIS(Interaction):
     grade = "external"
 
     address = Param("127.0.0.1", doc="Where PDUs are sent: a host, a broadcast or a multicast address.")
-    port = Param(3000, structural=True, ge=1, le=MOST_PORT, doc="Its port.")
+    port = Param(3000, structural=True, ge=1, le=MAX_PORT, doc="Its port.")
     listen_address = Param(
         "127.0.0.1", doc="Address that PDUs are received on; for multicast, that of the interface."
     )
     listen_port = Param(
-        0, structural=True, ge=0, le=MOST_PORT, doc="Port that they are received on; 0 for none."
+        0, structural=True, ge=0, le=MAX_PORT, doc="Port that they are received on; 0 for none."
     )
     remote = Param("", doc="Block of the entities of other simulators.")
     version = Param(7, structural=True, choices=(6, 7), doc="Protocol version of sent PDUs.")
@@ -100,7 +100,7 @@ class DIS(Interaction):
         """Move the remote entities, and send the own ones."""
         link, t = self._link(w), float(w.t[0])
         if self.time_warp:
-            link.await_clock(w.dt / self.time_warp, w.context.is_interrupted)
+            link.pace.hold(t, w.dt, w.context.is_interrupted)
         link.begin(t)
         own = self.site << 16 | self.application
         link.receive(t, self.exercise, own, w.scene.origin, self.reach, self.most_remote)
@@ -112,7 +112,7 @@ class DIS(Interaction):
         self._send(w, link, np.flatnonzero(~is_remote & (w.world == 0)), t)
 
     def _link(self, w: WorldView) -> ExerciseLink:
-        places = self.address, self.port, self.listen_address, self.listen_port
+        places = self.address, self.port, self.listen_address, self.listen_port, self.time_warp
         link: ExerciseLink = w.context.share((DIS, self.instance_name), partial(ExerciseLink, *places))
         return link
 
@@ -161,9 +161,9 @@ class DIS(Interaction):
 
     def _send(self, w: WorldView, link: ExerciseLink, rows: np.ndarray, t: float) -> None:
         """Send the entities that are due, and say which are gone."""
-        for row in rows[w.id[rows] > pdu.MOST_ENTITY]:
-            w.fail(row, f"DIS has no number for entity {w.id[row]}; the largest is {pdu.MOST_ENTITY}")
-        rows = rows[w.id[rows] <= pdu.MOST_ENTITY]
+        for row in rows[w.id[rows] > pdu.MAX_ENTITY]:
+            w.fail(row, f"DIS has no number for entity {w.id[row]}; the largest is {pdu.MAX_ENTITY}")
+        rows = rows[w.id[rows] <= pdu.MAX_ENTITY]
         here = set(w.id[rows].tolist())
         if gone := [number for number in link.sent if number not in here]:
             link.leave(gone)

@@ -14,7 +14,7 @@ from tussle.errors import ParameterError
 from tussle.plugins.stock.interaction.map_gen_2d.map_file import read_map_file
 from tussle.world.scene import Cuboid, Volume
 
-MOST_WALLS = 20_000
+MAX_WALLS = 20_000
 FORMATS = ("PNG", "JPEG", "TIFF", "BMP", "GIF", "PPM")
 """Formats of images. Others, such as PostScript, are read by programs that Pillow starts."""
 
@@ -74,9 +74,9 @@ class MapGen2D(Interaction):
             found += [
                 (0, 1, 0, columns), (0, rows, 0, 1), (0, rows, columns, columns + 1), (rows, rows + 1, 0, columns),
             ]  # fmt: skip
-        if len(found) > MOST_WALLS:
+        if len(found) > MAX_WALLS:
             raise ParameterError(
-                f"MapGen2D.map = {self.map!r} has {len(found):,} walls; it may have {MOST_WALLS:,}"
+                f"MapGen2D.map = {self.map!r} has {len(found):,} walls; it may have {MAX_WALLS:,}"
             )
         north = y + size * len(is_wall)
         return tuple(

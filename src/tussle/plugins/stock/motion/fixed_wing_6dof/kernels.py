@@ -7,7 +7,7 @@ import math
 from tussle.numeric import atan2
 from tussle.numeric.kernel import device
 
-LEAST = 1e-9  # [m^2/s^2]: keeps the quotients of an aircraft at rest in the air finite
+MIN_SQUARE = 1e-9  # [m^2/s^2]: keeps the quotients of an aircraft at rest in the air finite
 STALL = 0.45  # angle of attack [rad] that the lift approaches; at 0.1 rad it is 0.06 % below the linear one, at 0.2 rad 1 %
 GROUND_FREQUENCY = 20.0  # natural frequency of the contact with the ground [rad/s], critically damped
 
@@ -30,7 +30,7 @@ def attached(alpha):
 def flow_of(air):
     """Speed in the plane of symmetry and speed [m/s], angle of attack and sideslip [rad] of a velocity relative to the air [m/s]."""
     u, v, w = air
-    level = math.sqrt(u * u + w * w + LEAST)
+    level = math.sqrt(u * u + w * w + MIN_SQUARE)
     return level, math.sqrt(level * level + v * v), atan2(w, u), atan2(v, level)
 
 
@@ -127,7 +127,7 @@ def alpha_rate_of(air, omega, force, mass, wing, lift):
     fx, _, fz = force
     u_rate, w_rate = fx / mass + v * r - w * q, fz / mass + u * q - v * p
     level = u * u + w * w
-    square = level + v * v + LEAST
+    square = level + v * v + MIN_SQUARE
     delay = 0.25 * density * area * chord * lift[3] * math.sqrt(level / square) / mass
     return (u * w_rate - w * u_rate) / (square * (1.0 + delay))
 

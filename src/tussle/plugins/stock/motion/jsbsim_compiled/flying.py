@@ -161,7 +161,7 @@ def flight() -> Kernel:
 
 @cache
 def gusty_flight() -> Kernel:
-    """As `flight`, in gusts that change in each step."""
+    """Like `flight`, with gusts that change in each step."""
     advance = caller("F2w F i8 i8 i8 f8 f8")
 
     def fly_in_gusts(x, u, p, numbers, wholes, begin, end, dt, substeps):  # type: ignore[no-untyped-def]

@@ -13,6 +13,7 @@ from tussle.aircraft.compile import CompiledAircraft, compile_aircraft, save_sou
 from tussle.aircraft.files import package_root
 from tussle.aircraft.initial import place_by_quaternion, run_initial
 from tussle.aircraft.node import AircraftError
+from tussle.aircraft.script import Script, read_script
 from tussle.aircraft.trim import LinearModel, TrimPoint, level_flight, linearize, throttles_of, trim
 from tussle.api import Input, MotionBody, Param, RigidBodyModel
 from tussle.api.range_kernel import RangeKernel
@@ -23,7 +24,6 @@ from tussle.numeric.dryden import at_start
 from tussle.numeric.quaternion import quat_conjugate, quat_multiply, quat_rotate, quat_rotate_inverse
 from tussle.plugins.stock.motion.jsbsim_compiled import flightgear, flying
 from tussle.plugins.stock.motion.jsbsim_compiled.flying import BODY, FOOT, SLOTS
-from tussle.plugins.stock.motion.jsbsim_compiled.script import Script, read_script
 from tussle.world.geodesy import Origin
 
 KNOT = float(units.NAUTICAL_MILE / 3600)  # [m/s]

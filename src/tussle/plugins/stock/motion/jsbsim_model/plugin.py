@@ -20,6 +20,7 @@ from tussle.numeric.quaternion import (
     quat_to_yaw,
 )
 from tussle.plugins.stock.motion.jsbsim_model import kernels
+from tussle.plugins.stock.motion.jsbsim_model.compared import unlike_compiled
 from tussle.plugins.stock.motion.jsbsim_model.fleet import Fleet, Flown
 from tussle.plugins.stock.motion.jsbsim_model.flight import (
     FOOT,
@@ -34,11 +35,13 @@ from tussle.plugins.stock.motion.jsbsim_model.flight import (
 from tussle.plugins.stock.motion.jsbsim_model.processes import LOST, FleetProcesses, n_cores
 from tussle.world.geodesy import ECCENTRICITY_SQUARED, SEMI_MAJOR, SEMI_MINOR, Origin
 
+ONLY_HERE = "trim", "wind", "on_failure", "processes", "flightgear_output_enable"
+"""Parameters whose other values than the default keep an aircraft from flying compiled."""
 KNOT = float(units.NAUTICAL_MILE / 3600)  # [m/s]
 FORWARD_RIGHT_DOWN = np.array([[0.0], [1.0], [0.0], [0.0]])
 """Rotation between body axes forward, left, up and forward, right, down."""
 MIRRORED = np.array([[1.0], [-1.0], [-1.0]])
-"""From axes forward, right, down to forward, left, up, and back."""
+"""Signs that convert axes forward, right, down to forward, left, up, and back."""
 
 
 class TrimParam(Param):
@@ -113,6 +116,11 @@ class JSBSimAircraft(RigidBodyModel):
         le=256,
         doc="Processes that fly the aircraft; 1 is that of the simulation, 0 is one for each core. Results do not depend on it.",
     )
+    compiled = Param(
+        True,
+        structural=True,
+        doc="In mission files: fly as JSBSimCompiled where that gives the flight of JSBSim, in a fiftieth of the time.",
+    )
     flight = Handle(doc="The aircraft in JSBSim.")
 
     @classmethod
@@ -133,6 +141,25 @@ class JSBSimAircraft(RigidBodyModel):
                 return {}
             raise
         return {"jsbsim_root": str(root)}
+
+    def stand_in(self, is_moving: bool) -> tuple[str, dict[str, Any], str]:
+        """Return JSBSimCompiled, if it takes the aircraft and flies a second of it as JSBSim does."""
+        own = self.values
+        if not own["compiled"] or bool(own["script_name"]) == bool(own["aircraft"]):
+            return "", {}, ""
+        is_autopilot = bool(self.needed_properties)
+        taken = own["jsbsim_root"], own["aircraft"], own["script_name"]
+        changed = [name for name in ONLY_HERE if own[name] != type(self).params()[name].default]
+        if changed:
+            why = f"only JSBSim itself has {changed[0]} = {own[changed[0]]!r}"
+        elif not is_moving:
+            why = "only JSBSim itself starts entities without a velocity, by the script; give them a <speed>"
+        else:
+            why = unlike_compiled(*taken, self.commanded, is_autopilot)
+        if why:
+            return "", {}, f"is flown by JSBSim and not compiled, fifty times as fast: {why}"
+        values = dict(zip(("jsbsim_root", "aircraft", "script_name"), taken, strict=True))
+        return "JSBSimCompiled", values | {"commands": "autopilot" if is_autopilot else "surfaces"}, ""
 
     def open_one(self, row: Any) -> FlightHandle:
         """Load the aircraft; `spawn` reports its errors.

@@ -14,7 +14,7 @@ from tussle.plugins.stock.network.radio_network import kernels
 
 QUEUE, PLANE, _, _, HALF_DUPLEX, CHANCE, BLOCKED = range(7)
 NOBODY = -1
-LEAST = 0.01
+MIN_RECEPTION = 0.01
 """Rayleigh fading: receivers that would receive a smaller share of the messages are out of reach."""
 
 
@@ -80,7 +80,9 @@ class RadioNetwork(Network):
 
     def transmit(self, w: WorldView, outboxes: Sequence[Messages]) -> Links:
         """Decide which messages are received, and when."""
-        factor = exp(log(-math.log(LEAST)) / self.path_loss_exponent) if self.fading == "rayleigh" else 1.0
+        factor = (
+            exp(log(-math.log(MIN_RECEPTION)) / self.path_loss_exponent) if self.fading == "rayleigh" else 1.0
+        )
         links = Links(w, outboxes, (factor * self.range)[w.world])
         world, message = links.world[links.message], links.message
         start, end, is_sent, on_air = self._send(w, links, outboxes)

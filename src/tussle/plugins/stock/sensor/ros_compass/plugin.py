@@ -15,7 +15,7 @@ from tussle.plugins.links.ros.steps import NodeLink
 
 
 class CompassTopic(NamedTuple):
-    """Where the measurements of an entity go."""
+    """Topic of the measurements of one entity."""
 
     link: NodeLink
     publish: Callable[[Any, list[float]], None]

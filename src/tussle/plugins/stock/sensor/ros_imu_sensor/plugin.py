@@ -17,7 +17,7 @@ GRAVITY = 9.80665  # [m/s^2], standard acceleration of gravity (CGPM 1901)
 
 
 class ImuTopic(NamedTuple):
-    """Where the measurements of an entity go."""
+    """Topic of the measurements of one entity."""
 
     link: NodeLink
     publish: Callable[..., None]

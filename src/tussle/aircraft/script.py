@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from tussle.aircraft.files import NAME
 from tussle.aircraft.node import AircraftError, Element, read_file
+from tussle.errors import clipped
 
 START = ("simulation/sim-time-sec", "ge", "0")
 COMPARISONS = {">=": "ge", "ge": "ge", "gt": "ge", ">": "ge"}
@@ -26,7 +27,7 @@ def read_script(root: Path, name: str) -> Script:
         AircraftError: It cannot be read, or does anything but set properties at the start.
     """
     if not NAME.fullmatch(name):
-        raise AircraftError(f"script_name {name[:80]!r} is no name of a file below {root / 'scripts'}")
+        raise AircraftError(f"script_name {clipped(name)!r} is no name of a file below {root / 'scripts'}")
     top = read_file(root / "scripts" / name)
     settings: list[tuple[str, float]] = []
     run = top.find("run")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from tussle.errors import MissionError
-from tussle.mission.mends import mend
+from tussle.mission.repairs import repair
 
 MALFORMED = {
     "comment": ("<!-- run it --seed 3 -->", '"--" is inside a comment', "<!-- run it - -seed 3 -->"),
@@ -57,8 +57,8 @@ def test_what_scrimmage_cannot_read_either_is_an_error(files, text):
 
 def test_lines_stay_where_they_are():
     text = "<a>\n<b\n x='&'>\n<!-- --\n-- --><![CDATA[ & ]]>\n</c\n>\n & </a>"
-    mended, changes = mend(text)
-    assert mended.count("\n") == text.count("\n")
+    repaired, changes = repair(text)
+    assert repaired.count("\n") == text.count("\n")
     assert [(change.line, change.repaired) for change in changes] == [
         (3, "x='&amp;'>"), (4, "<!-- - -"), (6, "</b"), (8, "&amp; </a>"),
     ]  # fmt: skip
@@ -66,7 +66,7 @@ def test_lines_stay_where_they_are():
 
 def test_mending_takes_linear_time():
     for part in ("<a ", "<a '", "<!--", "</a ", "&", "<a b='", "<?x"):
-        mend(part * 200_000)
+        repair(part * 200_000)
 
 
 @pytest.mark.parametrize(("text", "whole"), [("12.5", 12), ("1.999", 1), ("3.0", 3)])

@@ -9,6 +9,8 @@ from __future__ import annotations
 import re
 from typing import NamedTuple
 
+from tussle.errors import clipped
+
 OPENING = re.compile(r"""<([^\s<>/!?]++)(?:[^"'<>]++|"[^"<]*+"|'[^'<]*+')*+>""")
 CLOSING = re.compile(r"</([^\s<>]++)\s*+>")
 AMPERSAND = re.compile(r"&(?!(?:lt|gt|amp|quot|apos|#\d{1,7}|#x[0-9A-Fa-f]{1,6});)")
@@ -16,7 +18,7 @@ OPAQUE = (("<!--", "-->"), ("<![CDATA[", "]]>"), ("<?", "?>"))
 """Begin and end of what holds no tags."""
 
 
-class Mend(NamedTuple):
+class Repair(NamedTuple):
     """A change that helps to make a text well-formed.
 
     Attributes:
@@ -30,18 +32,18 @@ class Mend(NamedTuple):
     repaired: str
 
 
-def mend(text: str) -> tuple[str, list[Mend]]:
-    """Return a text of the same lines with comments, closing tags and ampersands mended, and the changes.
+def repair(text: str) -> tuple[str, list[Repair]]:
+    """Return a text of the same lines with comments, closing tags and ampersands repaired, and the changes.
 
-    A text with other faults is mended up to the first of them.
+    A text with other faults is repaired up to the first of them.
     """
-    mender = _Mender(text)
-    mender.run()
-    lines = mender.mended.split("\n")
-    return mender.mended, [Mend(line, why, lines[line - 1].strip()) for line, why in mender.changes]
+    repairer = _Repairer(text)
+    repairer.run()
+    lines = repairer.repaired.split("\n")
+    return repairer.repaired, [Repair(line, why, lines[line - 1].strip()) for line, why in repairer.changes]
 
 
-class _Mender:
+class _Repairer:
     """Copies a text from left to right, with changes."""
 
     def __init__(self, text: str) -> None:
@@ -51,7 +53,7 @@ class _Mender:
         self.changes: list[tuple[int, str]] = []
 
     @property
-    def mended(self) -> str:
+    def repaired(self) -> str:
         return "".join([*self.parts, self.text[self.place :]])
 
     def run(self) -> None:
@@ -102,7 +104,7 @@ class _Mender:
         if name == match[1]:
             self.copy(match.end())
         else:
-            why = f"<{name[:80]}> is closed by </{match[1][:80]}>"
+            why = f"<{clipped(name)}> is closed by </{clipped(match[1])}>"
             self.copy(match.end(), match[0].replace(match[1], name, 1), why)
         return True
 

@@ -1,0 +1,79 @@
+"""What came from outside while a game was played: messages, and columns that were set, between two steps."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from tussle.declare.columns import Handle, Numbers
+from tussle.declare.lists import RaggedColumn
+from tussle.declare.messages import Message, Messages
+
+MESSAGE, COLUMN = "message", "column"
+
+
+@dataclass(frozen=True)
+class ExternalInput:
+    """What came from outside before a step of a world.
+
+    Attributes:
+        step: The step.
+        kind: "message" or "column".
+        name: Name of the message's type, or path of the column.
+        values: Field -> value of the message; or the column's values in this world, shaped as those of `Simulation.read`. None if a
+            message held an object that cannot be written down.
+        network: Network of the message; "" is the one that reaches everyone.
+        topic: Topic of the message; "" is the name of the type.
+    """
+
+    step: int
+    kind: str
+    name: str
+    values: Any
+    network: str = ""
+    topic: str = ""
+
+
+InputListener = Callable[[int, ExternalInput], None]
+"""Called with the world and what has come from outside."""
+
+
+def of_message(sent: Messages, place: int, step: int, network: str, topic: str) -> ExternalInput:
+    """The input that is a message of a batch.
+
+    Args:
+        sent: The batch.
+        place: Number of the message in it.
+        step: The step before which it came.
+        network: As it was published.
+        topic: The same.
+    """
+    values: dict[str, Any] | None = {name: _plain(sent.data[name], place) for name in sent.type.fields}
+    try:
+        json.dumps(values)
+    except TypeError:
+        values = None
+    return ExternalInput(step, MESSAGE, sent.type.__name__, values, network, topic)
+
+
+def _plain(values: Any, place: int) -> Any:
+    if isinstance(values, RaggedColumn):
+        return values[place].tolist()
+    return values[..., place].tolist() if isinstance(values, np.ndarray) else values[place]
+
+
+def fields_of(type_: type[Message], values: dict[str, Any]) -> dict[str, Any]:
+    """The fields of one message as `Simulation.publish` takes them, from the values of its input."""
+    kinds = {name: type_.fields.get(name) for name in values}
+    return {
+        name: [np.array(value, float)]
+        if isinstance(kind := kinds[name], Numbers) and kind.ragged
+        else [value]
+        if isinstance(kind, Handle)
+        else value
+        for name, value in values.items()
+    }

@@ -1,0 +1,51 @@
+"""Mechanisms that exist once: text that runs as code, and sleeping until the wall clock has caught up."""
+
+from __future__ import annotations
+
+import ast
+import re
+
+import pytest
+from tree import python_files, relative
+
+ONCE = {
+    ("exec",): {"src/tussle/numeric/source.py"},
+    # Besides the pace: who waits for another program, or for a user at a terminal.
+    ("time.sleep", "sleep"): {
+        "src/tussle/batch/dask_runner.py",
+        "src/tussle/cli/serve.py",
+        "src/tussle/cli/view.py",
+        "src/tussle/engine/schedule.py",
+        "src/tussle/pacing.py",
+    },
+}
+"""Names of a function -> the modules that call it."""
+
+
+def calls(text: str, names: tuple[str, ...]) -> bool:
+    """Whether a module calls a function by one of its names."""
+    nodes = (node for node in ast.walk(ast.parse(text)) if isinstance(node, ast.Call))
+    return any(ast.unparse(node.func) in names for node in nodes)
+
+
+@pytest.mark.parametrize("names", ONCE, ids=lambda names: names[0])
+def test_it_is_called_where_it_belongs(names):
+    found = {relative(path) for path in python_files("src") if calls(path.read_text(encoding="utf-8"), names)}
+    assert found == ONCE[names]
+
+
+def test_the_rule_sees_calls():
+    assert calls("def f():\n    exec(text, {})", ("exec",))
+    assert not calls("executor.submit(exec_all)", ("exec",))
+
+
+def test_limits_have_one_prefix():
+    """MAX_... and MIN_..., so that a reader finds all limits by one search; CODING.md."""
+    wrong = re.compile(r"\b(?:MOST|LEAST|LARGEST|LONGEST|SHORTEST|FEWEST|FARTHEST|NAP|CATCH)_?[A-Z]*\b")
+    found = {
+        f"{relative(path)}: {node.id}"
+        for path in python_files("src")
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store) and wrong.fullmatch(node.id)
+    }
+    assert not found
