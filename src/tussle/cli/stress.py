@@ -19,9 +19,9 @@ from tussle.cli.progress import ProgressMeter, compiling
 from tussle.cli.tables import fact_list, number_tables, title
 from tussle.cli.terminal import OK, put, say, say_note
 from tussle.stress.games import Played
-from tussle.stress.study import FAILURES, MOST_FAILURES, Probability, Sample, Stress
+from tussle.stress.study import FAILURES, MAX_FAILURES, Probability, Sample, Stress
 
-MOST_SHOWN = 5
+MAX_SHOWN = 5
 """Failing games that the end of a study shows."""
 
 
@@ -144,11 +144,11 @@ def show_failures(failures: list[Played], study: Stress, directory: Path, option
                 str(len(each.game.rekeys)),
             ],
         )
-        for i, each in enumerate(failures[:MOST_SHOWN])
+        for i, each in enumerate(failures[:MAX_SHOWN])
     ]
     put(*number_tables(["game", "robustness", "fails at [s]", "seed", "branches"], rows))
-    if len(failures) > MOST_SHOWN:
-        put(f" the worst {MOST_SHOWN} of {len(failures):,}; {min(len(failures), MOST_FAILURES)} are kept")
+    if len(failures) > MAX_SHOWN:
+        put(f" the worst {MAX_SHOWN} of {len(failures):,}; {min(len(failures), MAX_FAILURES)} are kept")
     files = "".join(f" --plugin-path {shlex.quote(str(p))}" for p in options.plugin_files)
     put("", f" tussle run {shlex.quote(str(directory / FAILURES / '0.xml'))}{files}")
 

@@ -18,7 +18,7 @@ Rekeys = tuple[tuple[int, int], ...]
 """(step, key) of each change, in order of the steps."""
 
 PAIR = re.compile(r"(\d{1,10}):(\d{1,20})", re.ASCII)
-MOST_STEP, MOST_KEY = 2**32 - 1, 2**64 - 1
+MAX_STEP, MAX_KEY = 2**32 - 1, 2**64 - 1
 TAKES = "it takes pairs of a step and a key, as 120:77 340:8, with steps that ascend, below 2^32, and keys below 2^64"
 
 
@@ -33,7 +33,7 @@ def checked_rekeys(value: Any) -> Rekeys:
     except (TypeError, ValueError):
         raise MissionError(f"rekeys = {value!r:.80} is not allowed; {TAKES}") from None
     steps = [step for step, _ in pairs]
-    if steps != sorted(set(steps)) or not all(0 <= s <= MOST_STEP and 0 <= k <= MOST_KEY for s, k in pairs):
+    if steps != sorted(set(steps)) or not all(0 <= s <= MAX_STEP and 0 <= k <= MAX_KEY for s, k in pairs):
         raise MissionError(f"rekeys = {value!r:.80} is not allowed; {TAKES}")
     return pairs
 

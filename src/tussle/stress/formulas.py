@@ -17,7 +17,7 @@ from tussle.numeric import total
 Traces = Mapping[str, np.ndarray]
 """Values of each term, (n_samples,); a quantity that is known at the end only is the same in all samples."""
 
-MOST_DELAY = 2**62
+MAX_DELAY = 2**62
 """Delay of what is known at the end of the game only [samples]."""
 
 
@@ -99,7 +99,7 @@ class Above(Formula):
 
     @property
     def delay(self) -> int:
-        return MOST_DELAY if self.is_late else 0
+        return MAX_DELAY if self.is_late else 0
 
     def over(self, traces: Traces) -> np.ndarray:
         return traces[self.term]
@@ -172,7 +172,7 @@ class Window(Formula):
 
     @property
     def delay(self) -> int:
-        return MOST_DELAY if self.last is None else min(MOST_DELAY, self.inner.delay + self.last)
+        return MAX_DELAY if self.last is None else min(MAX_DELAY, self.inner.delay + self.last)
 
     def over(self, traces: Traces) -> np.ndarray:
         of, empty = (np.maximum, -np.inf) if self.is_any else (np.minimum, np.inf)
@@ -211,7 +211,7 @@ class UntilHolds(Formula):
     @property
     def delay(self) -> int:
         inner = max(self.left.delay, self.right.delay)
-        return MOST_DELAY if self.last is None else min(MOST_DELAY, inner + self.last)
+        return MAX_DELAY if self.last is None else min(MAX_DELAY, inner + self.last)
 
     def over(self, traces: Traces) -> np.ndarray:
         left, right = np.broadcast_arrays(self.left.over(traces), self.right.over(traces))

@@ -31,7 +31,7 @@ STUDY = Document(
     BatchError,
 )
 """Fields of `stress.json`."""
-MOST_GAMES_FILE = 1 << 32
+MAX_GAMES_FILE = 1 << 32
 """Of the file of games [B]."""
 WORTH_PROCESSES = 4.0
 """CPU time of a round [s] below which processes would take longer to start than they save."""
@@ -148,7 +148,7 @@ class Ledger:
         file = self.path / GAMES_FILE
         if not file.exists():
             return {}
-        text = read_text(file, BatchError, MOST_GAMES_FILE)
+        text = read_text(file, BatchError, MAX_GAMES_FILE)
         whole = text[: text.rfind("\n") + 1]
         if whole != text:
             os.truncate(file, len(whole.encode()))

@@ -26,9 +26,9 @@ from tussle.stress.formulas import Above, Every, Formula, Not, UntilHolds, Windo
 from tussle.stress.signals import Factory
 from tussle.stress.terms import Arithmetic, AtEnd, Constant, OfStep, SignalTerm
 
-LONGEST = 1000
+MAX_LENGTH = 1000
 """Characters of a specification."""
-DEEPEST = 50
+MAX_DEPTH = 50
 """Nested parentheses and operators."""
 WORDS = ("always", "eventually", "until", "and", "or", "not", "inf")
 TOKEN = re.compile(
@@ -72,9 +72,9 @@ class SpecificationReader:
         Raises:
             ParameterError: The text is none.
         """
-        if len(self.text) > LONGEST:
+        if len(self.text) > MAX_LENGTH:
             raise ParameterError(
-                f"specification {self.text[:40]!r}... has {len(self.text)} characters; at most {LONGEST} are allowed"
+                f"specification {self.text[:40]!r}... has {len(self.text)} characters; at most {MAX_LENGTH} are allowed"
             )
         found = self._formula(self._implied())
         if (token := self._peek()).kind:
@@ -125,7 +125,7 @@ class SpecificationReader:
 
     def _implied(self) -> Formula | SignalTerm:
         self.depth += 1
-        if self.depth > DEEPEST:
+        if self.depth > MAX_DEPTH:
             raise self._wrong("it is nested too deeply", self.place)
         found = self._chained("or", lambda: self._chained("and", self._until))
         if self._takes("->"):
@@ -148,7 +148,7 @@ class SpecificationReader:
 
     def _unary(self) -> Formula | SignalTerm:
         self.depth += 1
-        if self.depth > DEEPEST:
+        if self.depth > MAX_DEPTH:
             raise self._wrong("it is nested too deeply", self.place)
         word = self._takes("not", "always", "eventually")
         if word:
@@ -225,7 +225,7 @@ class SpecificationReader:
     def _factor(self) -> Formula | SignalTerm:
         if self._takes("-"):
             self.depth += 1
-            if self.depth > DEEPEST:
+            if self.depth > MAX_DEPTH:
                 raise self._wrong("it is nested too deeply", self.place)
             inner = self._term(self._factor())
             self.depth -= 1

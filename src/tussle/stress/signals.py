@@ -19,7 +19,7 @@ from tussle.stress import kernels
 
 EDGE = 0.001
 """Error of a clearance [m]."""
-FARTHEST = 100.0
+MAX_CLEARANCE = 100.0
 """Clearances are measured up to here [m]; beyond they are this far."""
 
 
@@ -257,13 +257,13 @@ class Factory:
             )
 
         def evaluate(f: StepView) -> np.ndarray:
-            low, high = np.zeros(f.bodies.n), np.full(f.bodies.n, FARTHEST)
-            is_far = scene.free(f.bodies.pos, FARTHEST)
+            low, high = np.zeros(f.bodies.n), np.full(f.bodies.n, MAX_CLEARANCE)
+            is_far = scene.free(f.bodies.pos, MAX_CLEARANCE)
             while np.max(high - low, initial=0.0) > EDGE:
                 middle = 0.5 * (low + high)
                 is_free = scene.free(f.bodies.pos, middle)
                 low, high = np.where(is_free, middle, low), np.where(is_free, high, middle)
-            return f.extreme(np.where(is_far, FARTHEST, low), a, 1.0)
+            return f.extreme(np.where(is_far, MAX_CLEARANCE, low), a, 1.0)
 
         return LENGTH, evaluate
 

@@ -29,11 +29,11 @@ from tussle.stress.specification import Function, Specification, columns_of
 from tussle.stress.splitting import Repetition, interval, split
 
 RESULT_FILE, FAILURES = "result.json", "failures"
-MOST_FAILURES = 10
+MAX_FAILURES = 10
 """Failing games that are written as missions."""
 MANY = 0.5
 """Part of the games that a round of splitting may replace before a note says so."""
-FEW_ANCESTORS = 5
+MIN_ANCESTORS = 5
 
 
 @dataclass
@@ -288,7 +288,7 @@ class Stress:
                 "and branches do not come nearer by other luck"
             )
         ancestors = [r.n_ancestors for r in repetitions if not r.is_extinct]
-        if ancestors and np.median(ancestors) < FEW_ANCESTORS:
+        if ancestors and np.median(ancestors) < MIN_ANCESTORS:
             notes.append(
                 f"the failing games of a repetition descend from {np.median(ancestors):.0f} of its {found.n} first games: what is decided "
                 "at the start of a game is seen through few of them; more --particles make the result surer"
@@ -308,7 +308,7 @@ class Stress:
             return
         folder, listed = ledger.path / FAILURES, []
         with reported(ledger.path):
-            for number, each in enumerate(failures[:MOST_FAILURES]):
+            for number, each in enumerate(failures[:MAX_FAILURES]):
                 folder.mkdir(exist_ok=True)
                 put_whole(folder / f"{number}.xml", self.failing_mission(each.game))
                 listed.append(
