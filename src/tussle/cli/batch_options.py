@@ -194,6 +194,10 @@ class StressOptions(PoolOptions):
     probability: Annotated[
         bool, flag("--probability", "Estimate how likely a failure is, however rare, by games that branch.")
     ] = False
+    why: Annotated[
+        bool,
+        flag("--why", "Show from which moment on the worst failing game was lost, by branches of it."),
+    ] = False
     particles: Annotated[
         int,
         option("N", "With --probability: games at a time, of each repetition.", min=2, shows_default=True),

@@ -18,6 +18,7 @@ from tussle.cli.options import show_notes
 from tussle.cli.progress import ProgressMeter, compiling
 from tussle.cli.tables import fact_list, number_tables, title
 from tussle.cli.terminal import OK, put, say, say_note
+from tussle.stress.chances import Chance
 from tussle.stress.games import Played
 from tussle.stress.study import FAILURES, MAX_FAILURES, Probability, Sample, Stress
 
@@ -66,6 +67,8 @@ def stress(options: StressOptions) -> int:
                 found = study.probability(options.particles, options.repetitions, directory=directory, **how)
             else:
                 sample = study.sample(options.games, directory=directory, **how)
+            failures = found.failures if options.probability else sample.failures
+            lost = study.chances(failures[0], directory=directory, **how) if options.why and failures else []
         except Interrupted:
             say(
                 "interrupted",
@@ -77,6 +80,8 @@ def stress(options: StressOptions) -> int:
         show_probability(found, study, directory, options)
     else:
         show_sample(sample, study, directory, options)
+    if lost:
+        show_chances(lost, study)
     return OK
 
 
@@ -151,6 +156,24 @@ def show_failures(failures: list[Played], study: Stress, directory: Path, option
         put(f" the worst {MAX_SHOWN} of {len(failures):,}; {min(len(failures), MAX_FAILURES)} are kept")
     files = "".join(f" --plugin-path {shlex.quote(str(p))}" for p in options.plugin_files)
     put("", f" tussle run {shlex.quote(str(directory / FAILURES / '0.xml'))}{files}")
+
+
+def show_chances(lost: list[Chance], study: Stress) -> None:
+    """Show how likely the failure of the worst game was from each moment on."""
+    rows = [
+        (
+            "",
+            [
+                f"{study.mission.start + each.step * study.mission.dt:.6g}",
+                share(each.value, each.low, each.high),
+            ],
+        )
+        for each in lost
+    ]
+    put(*number_tables(["from t [s] on", "branches that fail"], rows))
+    put(
+        f" of {lost[0].n} branches of {FAILURES}/0.xml from each moment, with other luck; in parentheses: 95 % intervals"
+    )
 
 
 def again(options: StressOptions) -> str:

@@ -23,6 +23,7 @@ from tussle.errors import ParameterError
 from tussle.mission import Mission, to_xml
 from tussle.numeric import total
 from tussle.record.run_file import plain, put_whole, versions
+from tussle.stress.chances import Chance, chances
 from tussle.stress.games import GamePlayer, Ledger, Played, StressGame
 from tussle.stress.monitor import Watching
 from tussle.stress.specification import Function, Specification, columns_of
@@ -263,6 +264,33 @@ class Stress:
                 },
             )  # fmt: skip
         return result
+
+    def chances(
+        self,
+        failed: Played,
+        moments: int = 9,
+        branches: int = 50,
+        directory: str | Path | None = None,
+        **how: Any,
+    ) -> list[Chance]:
+        """How likely the failure of a game was from moments on: each the start of branches that repeat the game and then have other luck.
+
+        Args:
+            failed: A game of this study that failed.
+            moments: Moments, evenly spread from the start of the game to its failure.
+            branches: Branches from each.
+            directory: Where games are kept; None keeps them in memory.
+            how: `executor`, `processes`, `stack` and `on_game`, as for `GamePlayer`.
+
+        Raises:
+            BatchError: A game has failed with an error, or the directory holds another study.
+            ParameterError: The game did not fail, or a number is not allowed.
+        """
+        check_argument("moments", moments, Whole(2, 10**4))
+        check_argument("branches", branches, Whole(1, 10**6))
+        with self._ledger(directory) as ledger:
+            player = GamePlayer(self.batch, self.watching, ledger, **how)
+            return chances(player.play, failed, moments, branches)
 
     def _notes(self, found: Probability) -> list[str]:
         repetitions, n = found.repetitions, len(found.repetitions)

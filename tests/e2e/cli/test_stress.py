@@ -21,13 +21,15 @@ SPLIT = (*STUDY, "--probability", "--particles", "20", "--repetitions", "4")
 
 
 def test_a_study_from_question_to_a_failing_game(tussle, folder):
-    done = tussle(*SPLIT)
+    done = tussle(*SPLIT, "--why")
     assert re.search(r"probability of failure +\S+ \(\S+–\S+\)", done.stdout)
     assert "plain games would be" in done.stdout
-    command = " ".join(done.stdout.split()).partition(" tussle run ")[2]
+    command = " ".join(done.stdout.split()).partition(" tussle run ")[2].partition(" from t ")[0]
     listed = json.loads((folder / "out/result.json").read_text())["failures"]
     played = tussle("run", *command.split())
     assert listed[0]["state_hash"] in played.stdout
+    assert "branches that fail" in done.stdout
+    assert re.search(r" 1 \(0\.\d+–1\)", done.stdout)
     plain = tussle(*STUDY, "-n", "30")
     assert re.search(r"failed +\d+ of 30 games", plain.stdout)
     assert re.search(r"robustness +\S+, \S+, \S+ \(least", plain.stdout)

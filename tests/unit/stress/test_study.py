@@ -109,6 +109,21 @@ def test_a_directory_of_something_else_is_refused(found, tmp_path):
             study().sample(5, directory=copy)
 
 
+def test_a_game_is_lost_little_by_little(found):
+    """From the start a failure is as rare as it is; from the moment of the failure on, it is sure."""
+    one, result, _ = found
+    lost = one.chances(result.failures[0], 5, 40)
+    assert lost[0].step == 0
+    assert lost[-1].step == result.failures[0].verdict.first_below(0.0)
+    assert (lost[-1].value, lost[-1].n) == (1.0, 40)
+    assert lost[0].value < 0.3
+    assert all(each.low <= each.value <= each.high for each in lost)
+    assert one.chances(result.failures[0], 5, 40, stack=7) == lost
+    good = next(p for p in one.sample(30).games if not p.verdict.has_failed)
+    with pytest.raises(ParameterError, match="did not fail, so nothing is to be explained"):
+        one.chances(good)
+
+
 def test_a_game_that_fails_with_an_error_is_no_failure_of_the_specification():
     with pytest.raises(BatchError, match=r"the game with seed \d+ failed"):
         study(
