@@ -45,6 +45,21 @@ def test_splitting_agrees_with_plain_games(found):
     assert math.isfinite(result.n_plain)
 
 
+PLAIN = (37, 375_000)
+"""Failures and games of `tussle stress examples/stress/pads.xml --plugin-path examples/stress/hover.py --seed 1000000 -n 375000
+--spec "always (distance(left, right) > 2 m)"`, played once."""
+
+
+@pytest.mark.slow
+def test_splitting_agrees_with_very_many_plain_games():
+    one = Stress(EXAMPLE / "pads.xml", "always (distance(left, right) > 2 m)", plugin_files=[PLUGIN])
+    result = one.probability(100, 20)
+    failures, games = PLAIN
+    error = math.hypot((result.high - result.low) / 4.0, math.sqrt(failures) / games)
+    assert abs(result.value - failures / games) < 3.0 * error
+    assert error < 0.4 * result.value
+
+
 def test_the_same_in_any_stack_and_process(found):
     one, result, _ = found
     again = study().probability(20, 6, stack=3)
