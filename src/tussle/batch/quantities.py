@@ -57,7 +57,7 @@ class Quantity:
         """
         if len(text) > MAX_TEXT:
             raise ParameterError(
-                f"quantity {clipped(text)!r}... has {len(text)} characters; at most {MAX_TEXT} are allowed"
+                f"quantity {clipped(text)!r} has {len(text)} characters; at most {MAX_TEXT} are allowed"
             )
         try:
             with warnings.catch_warnings():  # the parser has opinions about "1if"; it is refused below

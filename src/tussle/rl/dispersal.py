@@ -70,7 +70,7 @@ def crowded(now: Situation) -> np.ndarray:
     cells = cells_of(now.pos)
     inside = now.alive & are_inside(cells)
     x, y = np.where(inside[..., None], cells, 0).transpose(2, 0, 1)
-    return inside & (n_robots(cells, now.alive)[np.arange(len(cells))[:, None], x, y] > 1.0)
+    return np.asarray(inside & (n_robots(cells, now.alive)[np.arange(len(cells))[:, None], x, y] > 1.0))
 
 
 class Dispersal(Task):

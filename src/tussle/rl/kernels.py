@@ -1,4 +1,4 @@
-"""Kernels of actions and observations: from rows of the body table to arrays (agents, numbers), and back.
+"""Kernels of actions, observations and rewards: from rows of the body table to arrays (agents, numbers), and back.
 
 An agent's number is world * agents per world + place in its world. A `spec` is kind and source of each feature, (n,), a row of the
 table that it is taken from, and its numbers, (n, 4): scale, then for own features the point (x, y, z) [m] that is subtracted, for
@@ -12,12 +12,13 @@ from typing import Any
 
 import numpy as np
 
-from tussle.numeric import atan2
+from tussle.numeric import atan2, exp, log
 from tussle.numeric.kernel import kernel, lean_device
 from tussle.numeric.neighbors.kernels import rank_bits
 from tussle.numeric.neighbors.lane_count import LANES
+from tussle.numeric.neighbors.lanes import bits, choose, load, lowest, splat, store
 from tussle.numeric.neighbors.nearest_lanes import NONE, find_nearest
-from tussle.numeric.neighbors.search import TABLE, in_range, nearest_places, table_of
+from tussle.numeric.neighbors.search import DIFFERENT, SAME, TABLE, in_range, nearest_places, table_of
 
 SCALAR, PLANE, SPACE, DISTANCE, SAME_TEAM, PRESENT, FORWARD, DIRECTION = range(8)
 """Kinds of features: a number, a vector of two or three numbers, and what is known of a neighbour; the direction of the nose; the
@@ -340,3 +341,160 @@ def settle(out, was_alive):
 
 SETTLE = {"float32": kernel("Sw B -> i8")(settle), "float64": kernel("Fw B -> i8")(settle)}
 """`settle` by type of the numbers."""
+
+
+# -- searches that start from a guess ------------------------------------------------------------------------------------------------
+
+GUESS = 1.1
+"""Distance of the next search over that of the last k-th other."""
+MAX_RANKED = 48
+"""Candidates that are compared all with all, instead of inserted one after another."""
+
+
+@lean_device
+def put_key(key, item, n, keys, items):
+    """Insert a key and its item into the sorted lists keys[:n] and items[:n]."""
+    p = n
+    while p > 0 and keys[p - 1] > key:
+        keys[p], items[p] = keys[p - 1], items[p - 1]
+        p -= 1
+    keys[p], items[p] = key, item
+
+
+@lean_device
+def scan_world(me, x, y, z, radius, mode, wanted, table, start, end, found):
+    """Write the places in [start, end) nearer than the radius, without `me`, to `found`; returns how many.
+
+    It tests 64 places before it looks at the result: each look is a branch that the processor cannot predict.
+    """
+    sx, sy, sz, team = table[5], table[6], table[7], table[8]
+    radius2, n = radius * radius, 0
+    for first in range(start, end, 64):
+        word = np.uint64(0)
+        for p in range(first, min(first + 64, end), LANES):
+            dx, dy, dz = load(sx, p) - x, load(sy, p) - y, load(sz, p) - z
+            hit = dx * dx + dy * dy + dz * dz < radius2
+            if mode == SAME:
+                hit = hit & (load(team, p) == wanted)
+            elif mode == DIFFERENT:
+                hit = hit & (load(team, p) != wanted)
+            word |= np.uint64(bits(hit)) << np.uint64(p - first)
+        if end - first < 64:
+            word &= (np.uint64(1) << np.uint64(end - first)) - np.uint64(1)
+        if first <= me < first + 64:
+            word &= ~(np.uint64(1) << np.uint64(me - first))
+        while word != 0:
+            found[n] = first + lowest(np.int64(word))
+            word &= word - np.uint64(1)
+            n += 1
+    return n
+
+
+@lean_device
+def sort_keys(keys, items, n, k, places, sorted_keys, sorted_items):
+    """Write the k smallest of n different keys, and their items, in order; the rest of the n places may be written, too."""
+    if n > MAX_RANKED:
+        for i in range(n):
+            if i < k:
+                put_key(keys[i], items[i], i, sorted_keys, sorted_items)
+            elif keys[i] < sorted_keys[k - 1]:
+                put_key(keys[i], items[i], k - 1, sorted_keys, sorted_items)
+        return
+    for first in range(0, n, LANES):
+        mine, smaller = load(keys, first), splat(0.0)
+        for j in range(n):
+            smaller = smaller + choose(mine > keys[j], splat(1.0), splat(0.0))
+        store(places, first, smaller)
+    for i in range(n):
+        at = np.uint64(places[i])
+        sorted_keys[at], sorted_items[at] = keys[i], items[i]
+
+
+@kernel(f"F2 (I I F) (I I I) {TABLE} (i8 i8 f8) Fw (i8 i8) I2w")
+def find_from_guess(floats, who, places, arrays, numbers, guesses, part, near):
+    """Write the rows of the k nearest others within a radius to near, (m, k), nearest first; -1 for those that are missing.
+
+    who: rows, agents, and what each looks for, (m,). places, arrays: as in `kernels.nearest_apart`; a world is one cell of the index.
+    numbers: k, mode of the teams, radius [m]. guesses: distance that is searched first by agent [m]; set for the next search. part:
+    agents [begin, end) of those in `who`.
+    """
+    source, ids, wanted = who
+    row_world, place, order = places
+    k, mode, radius = numbers
+    table = table_of(arrays)
+    world_start, keys, sx, sy, sz = table[0], table[1], table[5], table[6], table[7]
+    room = order.shape[0] + LANES
+    other, sorted_rows = np.empty(room, np.int64), np.empty(room, np.int64)
+    squares, ranks, sorted_keys = np.empty(room), np.empty(room), np.empty(room)
+    whole = squares.view(np.int64)
+    for i in range(part[0], part[1]):
+        row, a = source[i], ids[i]
+        w, me, x, y, z = row_world[row], place[row], floats[0, row], floats[1, row], floats[2, row]
+        start, end = world_start[w], world_start[w + 1]
+        shift = rank_bits(end - start)
+        mask = (1 << shift) - 1
+        reach = min(guesses[a], radius)
+        n = scan_world(me, x, y, z, reach, mode, wanted[i], table, start, end, other)
+        further = 1.5 * reach
+        for _ in range(2):  # the guess of those without k others is infinite: one search finds that again
+            if n < k and guesses[a] < radius:
+                n = scan_world(me, x, y, z, min(further, radius), mode, wanted[i], table, start, end, other)
+            further = radius
+        for j in range(n):
+            q = np.uint64(other[j])
+            dx, dy, dz = x - sx[q], y - sy[q], z - sz[q]
+            squares[j] = dx * dx + dy * dy + dz * dz
+        for j in range(n):
+            q = np.uint64(other[j])
+            whole[j] = (whole[j] >> shift << shift) | (keys[q] & mask)
+            other[j] = order[q]
+        sort_keys(squares, other, n, k, ranks, sorted_keys, sorted_rows)
+        for j in range(k):
+            near[i, j] = sorted_rows[j] if j < n else -1
+        guesses[a] = GUESS * math.sqrt(sorted_keys[k - 1]) + 1e-3 if n >= k else np.inf
+
+
+# -- particles ------------------------------------------------------------------------------------------------------------------------
+
+MARGIN, DAMPING = 1e-3, 0.25
+"""Of particles: width of soft contacts [m], and share of the velocity that is lost in a step."""
+
+
+@kernel("(F F) (F F F F F) (I I I) (F2 F F) (Fw Fw)")
+def total_force(push, own, places, others, total):
+    """Push [N] times strength, and the contact forces of all others, in order of id: a soft maximum of the penetration.
+
+    own: x, y, strength, contact force [N/m], and the team whose members are passed through, (n,). others: positions by place, radius
+    and team.
+    """
+    x, y, strength, stiffness, passed = own
+    row_world, place, world_start = places
+    points, radius, team = others
+    for i in range(x.shape[0]):
+        fx, fy = push[0][i] * strength[i], push[1][i] * strength[i]
+        w, me = row_world[i], place[i]
+        for p in range(world_start[w], world_start[w + 1]):
+            dx, dy = x[i] - points[0, p], y[i] - points[1, p]
+            reach = radius[me] + radius[p] + 50.0 * MARGIN  # beyond, the force is below 1e-20 N
+            square = dx * dx + dy * dy
+            if p != me and team[p] != passed[i] and 0.0 < square < reach * reach:
+                distance = math.sqrt(square)
+                depth = -(distance - (radius[me] + radius[p])) / MARGIN
+                soft = (max(depth, 0.0) + log(1.0 + exp(-abs(depth)))) * MARGIN
+                fx += stiffness[i] * dx / distance * soft
+                fy += stiffness[i] * dy / distance * soft
+        total[0][i], total[1][i] = fx, fy
+
+
+@kernel("F2w F2 F2 f8 i8")
+def slide(x, u, p, dt, substeps):
+    """Positions advance by the old velocities, which are then damped, pushed [N] at mass 1, and limited to p [m/s]."""
+    for _ in range(substeps):
+        for i in range(x.shape[1]):
+            x[0, i] += x[2, i] * dt
+            x[1, i] += x[3, i] * dt
+            vx, vy = x[2, i] * (1.0 - DAMPING) + u[0, i] * dt, x[3, i] * (1.0 - DAMPING) + u[1, i] * dt
+            speed = math.sqrt(vx * vx + vy * vy)
+            if speed > p[0, i]:
+                vx, vy = vx / speed * p[0, i], vy / speed * p[0, i]
+            x[2, i], x[3, i] = vx, vy

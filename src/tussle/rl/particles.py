@@ -6,52 +6,23 @@ first positions and actions, the trajectories agree to 1e-9.
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
 
 from tussle.api import Autonomy, Controller, Input, Interaction, MotionModel, Output, Param, State
 from tussle.mission import Block, Mission
-from tussle.numeric import exp, log
-from tussle.numeric.kernel import kernel
 from tussle.plugins.stock import Still
 from tussle.rl.action import Act
 from tussle.rl.computed import Computed
 from tussle.rl.draws import uniform
+from tussle.rl.kernels import slide, total_force
 from tussle.rl.observation import Each, Own
 from tussle.rl.reward import Situation, Term
 from tussle.rl.task import Task
 
-MARGIN, DAMPING = 1e-3, 0.25
 AGENTS, OTHERS, LANDMARKS = 1, 0, 2
 """Teams: those whom the game is about, their adversaries, and landmarks."""
-
-
-@kernel("(F F) (F F F F F) (I I I) (F2 F F) (Fw Fw)")
-def total_force(push, own, places, others, total):
-    """Push [N] times strength, and the contact forces of all others, in order of id: a soft maximum of the penetration.
-
-    own: x, y, strength, contact force [N/m], and the team whose members are passed through, (n,). others: positions by place, radius
-    and team.
-    """
-    x, y, strength, stiffness, passed = own
-    row_world, place, world_start = places
-    points, radius, team = others
-    for i in range(x.shape[0]):
-        fx, fy = push[0][i] * strength[i], push[1][i] * strength[i]
-        w, me = row_world[i], place[i]
-        for p in range(world_start[w], world_start[w + 1]):
-            dx, dy = x[i] - points[0, p], y[i] - points[1, p]
-            reach = radius[me] + radius[p] + 50.0 * MARGIN  # beyond, the force is below 1e-20 N
-            square = dx * dx + dy * dy
-            if p != me and team[p] != passed[i] and 0.0 < square < reach * reach:
-                distance = math.sqrt(square)
-                depth = -(distance - (radius[me] + radius[p])) / MARGIN
-                soft = (max(depth, 0.0) + log(1.0 + exp(-abs(depth)))) * MARGIN
-                fx += stiffness[i] * dx / distance * soft
-                fy += stiffness[i] * dy / distance * soft
-        total[0][i], total[1][i] = fx, fy
 
 
 class ParticleContact(Controller):
@@ -77,20 +48,6 @@ class ParticleContact(Controller):
         own = *g.components("pos")[:2], self.strength, self.stiffness, self.passes.astype(float)
         others = index.points, g.by_place(index, "radius")[0], g.by_place(index, "team")[0]
         total_force((self.push_x, self.push_y), own, places, others, (self.total_x, self.total_y))
-
-
-@kernel("F2w F2 F2 f8 i8")
-def slide(x, u, p, dt, substeps):
-    """Positions advance by the old velocities, which are then damped, pushed [N] at mass 1, and limited to p [m/s]."""
-    for _ in range(substeps):
-        for i in range(x.shape[1]):
-            x[0, i] += x[2, i] * dt
-            x[1, i] += x[3, i] * dt
-            vx, vy = x[2, i] * (1.0 - DAMPING) + u[0, i] * dt, x[3, i] * (1.0 - DAMPING) + u[1, i] * dt
-            speed = math.sqrt(vx * vx + vy * vy)
-            if speed > p[0, i]:
-                vx, vy = vx / speed * p[0, i], vy / speed * p[0, i]
-            x[2, i], x[3, i] = vx, vy
 
 
 class Particle(MotionModel):

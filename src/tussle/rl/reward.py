@@ -11,7 +11,7 @@ import numpy as np
 from tussle.api.bodies import DERIVED, FLOATS
 from tussle.errors import ParameterError, listed, nearest_name
 from tussle.record.events import CAPTURE, COLLISION, DEATH, FLAG
-from tussle.rl.kernels import SETTLE, take
+from tussle.rl import kernels
 from tussle.rl.observation import TEAMS, AgentRows, Component, Means, NearestOthers, block_numbers
 
 if TYPE_CHECKING:
@@ -88,7 +88,7 @@ class Situation:
             source = bodies.derived(name) if name in DERIVED else getattr(bodies, name)
             table = np.atleast_2d(source)
             out = np.zeros((self.alive.size, len(table)))
-            take(np.ascontiguousarray(table, float), self.rows, self.agents, out)
+            kernels.take(np.ascontiguousarray(table, float), self.rows, self.agents, out)
             self._columns[name] = out.reshape(*self.alive.shape, *source.shape[:-1])
         return self._columns[name]  # type: ignore[no-any-return]
 
@@ -284,7 +284,7 @@ class Term:
                 "for each world, such as values[:, None]"
             )
         np.multiply(values, self.weight, out=out, casting="same_kind")
-        wrong = int(SETTLE[out.dtype.name](out.reshape(-1), now.was_alive.reshape(-1)))
+        wrong = int(kernels.SETTLE[out.dtype.name](out.reshape(-1), now.was_alive.reshape(-1)))
         if wrong >= 0:
             world, agent = divmod(wrong, agents)
             raise ParameterError(

@@ -154,12 +154,12 @@ class Rollout:
             last = advantages[t] = delta + discount * trace * self.goes_on[t] * last
         there, n_worlds = self.alive.bool(), self.swarm.n_worlds
         time, agent = there.nonzero(as_tuple=True)
-        parts = [
-            x[there] for x in (self.obs, self.actions, self.log_prob, advantages, advantages + self.values)
-        ]
         place = time * n_worlds + agent // len(self.role.agents)
-        mask = None if self.mask is None else self.mask[there]
-        return Decisions(*parts, place, mask, None if self.states is None else self.states.flatten(0, 1))
+        return Decisions(
+            self.obs[there], self.actions[there], self.log_prob[there], advantages[there],
+            (advantages + self.values)[there], place, None if self.mask is None else self.mask[there],
+            None if self.states is None else self.states.flatten(0, 1),
+        )  # fmt: skip
 
 
 class Trainer:

@@ -171,8 +171,7 @@ def test_a_script_in_the_way_of_cleanrl_learns_on_make_vec():
 def test_torchrl_takes_agents_groups_and_dead_agents():
     """Its wrappers check our specifications; groups are the roles of a task."""
     environments = pytest.importorskip("torchrl.envs", reason="TorchRL is not installed")
-    from torchrl.envs.utils import check_env_specs
-
+    check_env_specs = pytest.importorskip("torchrl.envs.utils").check_env_specs
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of TorchRL itself
         check_env_specs(environments.GymWrapper(make(ReachPoint)))

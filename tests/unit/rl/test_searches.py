@@ -43,6 +43,10 @@ def test_any_guess_gives_the_nearest(n, mode, radius):
 
         near = shared.nearest(bodies, None, (rows, rows, team), places, arrays, (k, mode, radius), split)
         np.testing.assert_array_equal(near, by_hand)
+        again = shared._guesses[None, radius]
+        np.testing.assert_array_equal(
+            np.isinf(again), n_found < k
+        )  # one search next time, where there are too few
 
 
 @pytest.mark.parametrize("which", [Formation, Battle])
@@ -65,8 +69,8 @@ def test_a_search_with_guesses_is_one_without(which, monkeypatch):
 def test_rewards_and_observations_share_a_search(monkeypatch):
     """Of Formation, and of a reward of one's own that asks for fewer of the same others as the observation does."""
     calls = []
-    search = searches.find_nearest
-    monkeypatch.setattr(searches, "find_nearest", lambda *a: calls.append(a) or search(*a))
+    search = searches.find_from_guess
+    monkeypatch.setattr(searches, "find_from_guess", lambda *a: calls.append(a) or search(*a))
 
     def lonely(now):
         return now.nearest(k=2).distance[..., 1] > 50.0

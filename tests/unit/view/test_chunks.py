@@ -41,7 +41,7 @@ def frame(t, entities):
 def followed(*moments):
     """Tracks of each frame, and their table; frames are 1 s apart and a leap is 10 m."""
     tracks = Tracks(leap=10.0)
-    rows = [tracks.follow(i, frame(float(i), entities)).tolist() for i, entities in enumerate(moments)]
+    rows = [tracks.assign(i, frame(float(i), entities)).tolist() for i, entities in enumerate(moments)]
     return rows, {name: values.tolist() for name, values in tracks.table().items()}
 
 
@@ -69,9 +69,9 @@ def test_what_is_fast_does_not_jump():
     tracks = Tracks(leap=10.0)
     fast = frame(0.0, {1: (1, 0.0)})
     fast.vel[:] = 2.0 * fast.vel
-    assert tracks.follow(0, fast).tolist() == [0]
-    assert tracks.follow(1, frame(1.0, {1: (1, 19.9)})).tolist() == [0]
-    assert tracks.follow(2, frame(2.0, {1: (1, 40.0)})).tolist() == [1]
+    assert tracks.assign(0, fast).tolist() == [0]
+    assert tracks.assign(1, frame(1.0, {1: (1, 19.9)})).tolist() == [0]
+    assert tracks.assign(2, frame(2.0, {1: (1, 40.0)})).tolist() == [1]
 
 
 def test_nobody_at_all_is_an_empty_table():

@@ -109,7 +109,7 @@ class Tracks:
         self._last = np.zeros(0, np.int64)
         self._before: tuple[Frame, np.ndarray] | None = None
 
-    def follow(self, i: int, frame: Frame) -> np.ndarray:
+    def assign(self, i: int, frame: Frame) -> np.ndarray:
         """Return the track of each entity of the next frame, (n,)."""
         tracks = np.full(len(frame), -1, np.int64)
         if self._before is not None:
@@ -162,7 +162,7 @@ def pack(first: int, frames: Sequence[Frame], step: float, leap: float = math.in
     """
     frames = [_somewhere(frame) for frame in frames]
     tracks = Tracks(leap)
-    numbers = np.concatenate([tracks.follow(i, frame) for i, frame in enumerate(frames)])
+    numbers = np.concatenate([tracks.assign(i, frame) for i, frame in enumerate(frames)])
     order = np.argsort(numbers, kind="stable")
     is_head = np.diff(numbers[order], prepend=-1) != 0
     pos, quat, health = (
