@@ -64,6 +64,7 @@ class ChosenRows:
         self.ints = bodies.ints
         self._bodies = bodies
         self._chosen: dict[ChosenEntities, tuple[np.ndarray, np.ndarray]] = {}
+        self._has_many: dict[tuple[ChosenEntities, ChosenEntities], bool] = {}
 
     def of(self, chosen: ChosenEntities) -> tuple[np.ndarray, np.ndarray]:
         """ChosenRows, and the place where those of each world start, (n_worlds + 1,)."""
@@ -77,6 +78,13 @@ class ChosenRows:
                 members = members[is_in]
             self._chosen[chosen] = np.ascontiguousarray(members), np.ascontiguousarray(start)
         return self._chosen[chosen]
+
+    def has_many_pairs(self, a: ChosenEntities, b: ChosenEntities) -> bool:
+        """Some world has so many pairs that not all of them are looked at."""
+        if (a, b) not in self._has_many:
+            n_pairs = np.diff(self.of(a)[1]) * np.diff(self.of(b)[1])
+            self._has_many[a, b] = bool(np.max(n_pairs, initial=0) >= kernels.SWEEP_FROM)
+        return self._has_many[a, b]
 
 
 @dataclass
@@ -117,7 +125,7 @@ class StepView:
         """Least distance of an entity a from another b [m], (n_worlds,); inf without a pair."""
         out, pos = np.empty(self.bodies.n_worlds), self.bodies.pos
         (rows_a, start_a), (rows_b, start_b) = self.rows.of(a), self.rows.of(b)
-        if np.max(np.diff(start_a) * np.diff(start_b), initial=0) >= kernels.SWEEP_FROM:
+        if self.rows.has_many_pairs(a, b):
             both = np.union1d(rows_a, rows_b)
             world = self.bodies.world[both]
             order = np.lexsort((pos[0, both], world))
