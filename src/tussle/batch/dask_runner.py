@@ -231,7 +231,9 @@ class _Playing:
             if chunk is None:
                 return
             group = chunk.runs[0].group
-            own = Package((self.package.missions[group],), self.package.plugin_files)
+            own = Package(
+                (self.package.missions[group],), self.package.plugin_files, watch=self.package.watch
+            )
             code = code_of(self.package.mission(group))
             there = self.client.get_executor(workers=[worker], pure=False)
             chunk.future = there.submit(play_chunk, own, chunk.runs, self.topic, code)

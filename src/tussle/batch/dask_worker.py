@@ -56,7 +56,7 @@ def play_chunk(
 
     with _playing:
         report_at = time.monotonic() + REPORT_PERIOD
-        with closing(play(package.mission(0), take, len(runs))) as messages:  # type: ignore[type-var]
+        with closing(play(package.mission(0), take, len(runs), package.watcher())) as messages:  # type: ignore[type-var]
             for message in messages:
                 task = worker.state.tasks.get(key)
                 if task is None or task.state == "cancelled":  # a thread cannot be ended from outside

@@ -88,7 +88,7 @@ class InProcess:
         while (group := queue.largest()) is not None:
             mission = package.mission(group)
             size = even_size(self.stack or stack_size(mission), len(queue.groups[group]), 1)
-            yield from play(mission, partial(queue.take, group), size)
+            yield from play(mission, partial(queue.take, group), size, package.watcher())
 
 
 class Processes:
@@ -321,7 +321,7 @@ def _play_all(pipe: Connection, package: Package, stack: int | None, n_processes
             return own + ask(group, n - len(own))[0] if n > len(own) else own
 
         size = even_size(stack or stack_size(missions[group]), n_left, n_processes)
-        for message in play(missions[group], take, size):
+        for message in play(missions[group], take, size, package.watcher()):
             pipe.send(message)
 
 

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import math
 import platform
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Protocol
+
+import numpy as np
 
 from tussle.batch import by_value
+from tussle.engine.simulation import Simulation
 from tussle.mission import Mission, PluginFile
+from tussle.mission.rekeys import Rekeys
 
 
 @dataclass(frozen=True)
@@ -21,12 +25,14 @@ class BatchRun:
         group: Index of the mission in the package.
         seed: Seed.
         params: Values that differ from that mission, by path, SI.
+        rekeys: (step, key) pairs, as for `Simulation.reset`; None for those of the mission.
     """
 
     number: int
     group: int
     seed: int
     params: Mapping[str, Any] = field(default_factory=dict)
+    rekeys: Rekeys | None = None
 
 
 @dataclass(frozen=True)
@@ -45,6 +51,7 @@ class Finished:
         host: Name of the machine.
         metrics: (team or None, name, value).
         alive: (team, t [s], entities) for each change of the number, from the start to the end.
+        watched: What the package's watcher says of the game; None without one, and for a failed run.
     """
 
     number: int
@@ -58,6 +65,7 @@ class Finished:
     host: str
     metrics: list[tuple[int | None, str, float]]
     alive: list[tuple[int, float, int]]
+    watched: Any = None
 
     @staticmethod
     def failed(run: BatchRun, error: str, teams: Iterable[int]) -> Finished:
@@ -79,6 +87,16 @@ class Heartbeat:
     under_way: float
 
 
+class Watcher(Protocol):
+    """Sees each step of a stack of games."""
+
+    def restart(self, worlds: np.ndarray) -> None:
+        """Worlds have been reset, (m,)."""
+
+    def finish(self, world: int) -> Any:
+        """What is to be known of a world that has just ended; it pickles."""
+
+
 @dataclass(frozen=True)
 class Package:
     """The missions of a batch and the plugin files that they need.
@@ -87,11 +105,20 @@ class Package:
         missions: One per group, pickled, since classes of plugin files exist only once the files are loaded.
         plugin_files: The files.
         run_timeout: Wall time that a run may take [s]; None for no limit.
+        watch: Function of a new simulation that makes its watcher, pickled; None for no watcher.
     """
 
     missions: tuple[bytes, ...]
     plugin_files: tuple[PluginFile, ...] = ()
     run_timeout: float | None = None
+    watch: bytes | None = None
+
+    def watcher(self) -> Callable[[Simulation], Watcher] | None:
+        """The function that makes watchers; None for no watcher."""
+        made: Callable[[Simulation], Watcher] | None = (
+            None if self.watch is None else by_value.loads(self.watch)
+        )
+        return made
 
     def mission(self, group: int) -> Mission:
         """The mission of a group."""

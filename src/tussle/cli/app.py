@@ -30,6 +30,7 @@ COMMANDS = {
     "analyze": (batch_options.AnalyzeOptions, "tussle.cli.analyze:analyze"),
     "report": (batch_options.ReportOptions, "tussle.cli.analyze:report"),
     "optimize": (batch_options.OptimizeOptions, "tussle.cli.optimize:optimize"),
+    "stress": (batch_options.StressOptions, "tussle.cli.stress:stress"),
     "train": (train_options.TrainOptions, "tussle.cli.train:train"),
     "league": (train_options.LeagueOptions, "tussle.cli.league:league"),
     "ros-node": (RosNodeOptions, "tussle.cli.ros_node:ros_node"),

@@ -20,16 +20,9 @@ from tussle.cli.options import (
 
 
 @dataclass(frozen=True, kw_only=True)
-class ManyGamesOptions(MissionOptions):
-    """Options shared by batches and searches."""
+class PoolOptions(MissionOptions):
+    """Options shared by all commands that play many games."""
 
-    vary: Annotated[
-        list[str],
-        option(
-            "NAME=VALUES",
-            "Vary a value: speed=20:30, prey.count=50:100:int, gain=1e-3:10:log, tactic=keep,switch. Can be repeated.",
-        ),
-    ] = field(default_factory=list)
     seed: Annotated[
         int | None, option("N", "First seed; by default 1. The others follow it.", min=0, max=MAX_SEED)
     ] = None
@@ -46,6 +39,19 @@ class ManyGamesOptions(MissionOptions):
             "S", "Stop a game that takes longer than S seconds, and record it as failed; by default never."
         ),
     ] = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class ManyGamesOptions(PoolOptions):
+    """Options shared by batches and searches."""
+
+    vary: Annotated[
+        list[str],
+        option(
+            "NAME=VALUES",
+            "Vary a value: speed=20:30, prey.count=50:100:int, gain=1e-3:10:log, tactic=keep,switch. Can be repeated.",
+        ),
+    ] = field(default_factory=list)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -171,6 +177,49 @@ class OptimizeOptions(ManyGamesOptions):
             raise typer.BadParameter("--objective is missing: a quantity such as 'score[3]-score[2]'")
         if not self.vary:
             raise typer.BadParameter("--vary is missing: speed=20:30, gain=1e-3:10:log, tactic=keep,switch")
+
+
+@dataclass(frozen=True, kw_only=True)
+class StressOptions(PoolOptions):
+    """Find how a mission fails: how often its games break a specification, how near the others come, and how rare failures are."""
+
+    spec: Annotated[
+        str,
+        option(
+            "SPEC",
+            "What must hold: 'always (distance(team 1, team 1) > 2 m)', 'lost[1] / start[1] < 0.2', or FILE.py:FUNCTION.",
+        ),
+    ] = ""
+    games: Annotated[int, option("N", "Games to play.", "--games", "-n", min=1, shows_default=True)] = 1000
+    probability: Annotated[
+        bool, flag("--probability", "Estimate how likely a failure is, however rare, by games that branch.")
+    ] = False
+    why: Annotated[
+        bool,
+        flag("--why", "Show from which moment on the worst failing game was lost, by branches of it."),
+    ] = False
+    particles: Annotated[
+        int,
+        option("N", "With --probability: games at a time, of each repetition.", min=2, shows_default=True),
+    ] = 100
+    repetitions: Annotated[
+        int, option("N", "With --probability: independent repetitions.", min=2, shows_default=True)
+    ] = 20
+    directory: Annotated[
+        Path | None,
+        option(
+            "DIR",
+            "Directory of the study; by default stress/NAME-HASH. The same command continues it.",
+            "--out",
+        ),
+    ] = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not self.spec:
+            raise typer.BadParameter(
+                "--spec is missing: what must hold, such as 'always (distance(team 1, team 1) > 2 m)'"
+            )
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -20,7 +20,7 @@ from tussle.declare.messages import Message, Messages
 from tussle.engine import access
 from tussle.engine.arrivals import reset, spawn_due
 from tussle.engine.calls import Schedule
-from tussle.engine.reseed import renew_keys
+from tussle.engine.reseed import branch_keys, renew_keys, set_rekeys
 from tussle.engine.result import WorldResult
 from tussle.engine.rows import place
 from tussle.engine.schedule import compose
@@ -29,6 +29,7 @@ from tussle.engine.state import SimulationState
 from tussle.engine.step_end import remove_dead, world_result
 from tussle.errors import MissionError, ParameterError, PluginError
 from tussle.mission import GivenMission, Mission, mission_of
+from tussle.mission.rekeys import Rekeys
 from tussle.mission.spec import SHUFFLED
 from tussle.record.inputs import COLUMN, ExternalInput, fields_of, of_message
 
@@ -160,6 +161,8 @@ class Simulation:
             if self.observers and not self.events.is_replaying:
                 for observer in self.observers:
                     observer(self)
+            if state.rekeys:
+                branch_keys(state)
             for call in self.schedule.calls:
                 call.run()
         except PluginError as error:
@@ -216,6 +219,7 @@ class Simulation:
         worlds: Iterable[int],
         seeds: Sequence[int] | None = None,
         params: Mapping[str, Any] | None = None,
+        rekeys: Sequence[Rekeys] | None = None,
     ) -> None:
         """Restart some worlds, optionally with new seeds and parameters. The other worlds are not affected.
 
@@ -223,9 +227,12 @@ class Simulation:
             worlds: Numbers of the worlds.
             seeds: New seed of each; by default the previous one.
             params: As in the constructor; one value, or one per item of `worlds`.
+            rekeys: For each, pairs of a step and the random key with which the world draws from there on: up to the start of that step
+                the game is the same, then it has other luck. By default those of the mission.
 
         Raises:
             ParameterError: A world does not exist or is given twice, or a seed or parameter is not allowed.
+            MissionError: Re-keys are not in order of their steps, or a number is not allowed.
         """
         numbers = [int(w) for w in worlds]
         if len(set(numbers)) < len(numbers) or not all(0 <= w < self.n_worlds for w in numbers):
@@ -236,6 +243,9 @@ class Simulation:
             _check_seeds(seeds)
             if len(seeds) != len(numbers):
                 raise ParameterError(f"reset: {len(seeds)} seeds for {len(numbers)} worlds")
+        if rekeys is not None and len(rekeys) != len(numbers):
+            raise ParameterError(f"reset: rekeys of {len(rekeys)} for {len(numbers)} worlds")
+        set_rekeys(self.state, numbers, rekeys)
         reset(self.state, numbers, seeds, params)
 
     # -- access between steps -----------------------------------------------------------------------------------------------------------

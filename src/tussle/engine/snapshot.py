@@ -46,6 +46,7 @@ def snapshot(state: SimulationState) -> Snapshot:
         "failed": state.failed.copy(),
         "results": list(state.results),
         "parked": dict(state.parked),
+        "rekeys": dict(state.rekeys),
         "births": copy.deepcopy(
             (
                 births.next_id,
@@ -107,6 +108,7 @@ def restore(state: SimulationState, saved: Snapshot) -> None:
     clock.step[:], clock.common = world["step"], world["common"]
     state.running[:], state.failed[:] = world["running"], world["failed"]
     state.results, state.parked = list(world["results"]), dict(world["parked"])
+    state.rekeys = dict(world["rekeys"])
     state.world_view.births = list(world["requested_births"])
     state.world_view.deaths, state.world_view.moved = [], []  # requested in an interrupted step
     state.overrides.restore(world["params"])

@@ -23,6 +23,7 @@ from tussle.engine.table import Stored
 from tussle.engine.world_bindings import WorldBinding
 from tussle.errors import PluginError
 from tussle.mission import Mission
+from tussle.mission.rekeys import Rekeys
 from tussle.plugins.stock import advise_controllers
 
 if TYPE_CHECKING:
@@ -72,6 +73,7 @@ class SimulationState:
         failed: True for worlds in which a plugin has failed, (n_worlds,).
         results: Result of each world that has ended or failed.
         parked: World -> its last rows, for those that have ended.
+        rekeys: World -> its re-keys, for worlds that have some.
         has_failures: A world has failed since dead entities were last removed.
         has_changed: Entities were added or removed since the end conditions were last checked.
         checked: Columns that are checked at the end of a step, and the mask of faulty rows, (n,).
@@ -95,6 +97,7 @@ class SimulationState:
         self.running, self.failed = np.ones(n, bool), np.zeros(n, bool)
         self.results: list[WorldResult | None] = [None] * n
         self.parked: dict[int, Parked] = {}
+        self.rekeys: dict[int, Rekeys] = {}
         self.has_failures, self.has_changed, self.by_substep = False, True, False
         clock = Clock(n, mission.start, mission.dt)
         keys = np.array([s % 2**64 for s in seeds], np.uint64)

@@ -92,14 +92,7 @@ class PluginFile:
         Raises:
             MissionError: It cannot be imported, or defines no plugin and no Task; the message has the file's line.
         """
-        self._register()
-        try:
-            module = importlib.import_module(self.module)
-        except (Exception, SystemExit) as error:
-            sys.modules.pop(self.module, None)
-            raise MissionError(
-                f"{self._line(error)}: it cannot be imported: {type(error).__name__}: {error}"
-            ) from error
+        module = self.imported()
         classes = {
             key: value
             for key, value in vars(module).items()
@@ -111,6 +104,21 @@ class PluginFile:
                 f"{self.path}: it defines no plugin (a class derived from Autonomy, MotionModel, ...) and no Task"
             )
         return found
+
+    def imported(self) -> ModuleType:
+        """Import the file, whatever it defines.
+
+        Raises:
+            MissionError: It cannot be imported; the message has the file's line.
+        """
+        self._register()
+        try:
+            return importlib.import_module(self.module)
+        except (Exception, SystemExit) as error:
+            sys.modules.pop(self.module, None)
+            raise MissionError(
+                f"{self._line(error)}: it cannot be imported: {type(error).__name__}: {error}"
+            ) from error
 
     def _module(self, name: str) -> str:
         parts = PurePosixPath(name).with_suffix("").parts

@@ -19,6 +19,7 @@ from tussle.mission import displayed
 from tussle.mission.cadence import Cadence
 from tussle.mission.laws import check_compat, with_laws
 from tussle.mission.limits import Limits
+from tussle.mission.rekeys import checked_rekeys
 from tussle.plugins import stock
 from tussle.world.scene import Scene, find_region
 
@@ -285,6 +286,8 @@ class Mission:
             replaced by those of `tussle.historic`, with the same parameters.
         reseed_time: From the first step at or after this time on [s], random numbers are drawn with another seed; None for never.
         reseed: Seed from `reseed_time` on, the same for all worlds; None to derive it from the seed of each world.
+        rekeys: (step, key) pairs: from the states at the start of that step on, all worlds draw random numbers with that key. So a game
+            is played again up to a step, and then with other luck.
         limits: Limits on the entities that a world may hold, and on the positions drawn for them. The blocks' own entities are
             always accepted; `Limits.large()` is for plugins that spawn very many more.
     """
@@ -304,6 +307,7 @@ class Mission:
     compat: str = ""
     reseed_time: float | None = None
     reseed: int | None = None
+    rekeys: Any = ()
     limits: Limits = field(default=Limits(), repr=False)  # no effect on the game
 
     def __post_init__(self) -> None:
@@ -324,6 +328,7 @@ class Mission:
             raise MissionError(
                 f"mission: end = {self.end!r} with dt = {self.dt!r} is not allowed; the number of steps must be finite"
             )
+        _set(self, "rekeys", checked_rekeys(self.rekeys))
         _set(self, "end_conditions", end_conditions(self.end_conditions, "mission: end_conditions"))
         for name, kind in (("interactions", Interaction), ("metrics", Metric), ("networks", Network)):
             _set(self, name, _plugins(f"mission: {name}", getattr(self, name), kind))

@@ -264,6 +264,6 @@ PLUGIN = {
 }
 """Attributes that every plugin's tag takes besides the plugin's parameters."""
 
-SEED_ATTRIBUTES = ("reseed_time", "reseed")
+SEED_ATTRIBUTES = ("reseed_time", "reseed", "rekeys")
 MANY = ("autonomy", "controller", "sensor", "base")
 """Tags of an entity that may occur several times."""

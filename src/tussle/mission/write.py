@@ -17,6 +17,7 @@ from tussle.mission.given import GivenMission, mission_of
 from tussle.mission.node import Node
 from tussle.mission.plugin_tags import RATED
 from tussle.mission.problems import Place
+from tussle.mission.rekeys import rekeys_text
 from tussle.mission.spec import Block, Mission
 from tussle.mission.tags import BASE, ENTITY, RUN, SEED_ATTRIBUTES, WORLD, TagSpec
 from tussle.plugins import stock
@@ -92,8 +93,10 @@ def to_xml(mission: GivenMission, seed: int | None = None) -> str:
     if mission.update != RUN["update"].default:
         run["update"] = mission.update
     root.children = [_node("run", run), _node("end_condition", text=", ".join(mission.end_conditions))]
-    reseed = {name: getattr(mission, name) for name in SEED_ATTRIBUTES}
+    reseed = {name: getattr(mission, name) for name in SEED_ATTRIBUTES if name != "rekeys"}
     reseed = {name: codecs.written(value) for name, value in reseed.items() if value is not None}
+    if mission.rekeys:
+        reseed["rekeys"] = rekeys_text(mission.rekeys)
     if seed is not None or reseed:
         root.children.append(_node("seed", reseed, "" if seed is None else str(seed)))
     origin = mission.scene.origin

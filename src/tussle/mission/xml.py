@@ -23,6 +23,7 @@ from tussle.mission.overrides import TreeEditor, as_texts
 from tussle.mission.plugin_files import PluginFile
 from tussle.mission.plugin_tags import PluginReader
 from tussle.mission.problems import Place, Problems
+from tussle.mission.rekeys import parse_rekeys
 from tussle.mission.scene_tags import SCENE_TAGS, SceneReader
 from tussle.mission.source import MissionSource, SourceReader, find_mission
 from tussle.mission.spec import MISSION_VALUES, Mission, end_conditions
@@ -375,8 +376,11 @@ class _WorldReader:
                 )
                 continue
             try:
-                found[attribute] = MISSION_VALUES[attribute].convert(text, f"seed@{attribute}")
-            except ParameterError as error:
+                if attribute == "rekeys":
+                    found[attribute] = parse_rekeys(text)
+                else:
+                    found[attribute] = MISSION_VALUES[attribute].convert(text, f"seed@{attribute}")
+            except (ParameterError, MissionError) as error:
                 self.problems.error(node.where(attribute), str(error))
         if "reseed_time" in found and "reseed" not in node.attributes:
             self.problems.note(

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 from small_worlds import block, mission
 
 from tussle import Simulation
 from tussle.api import Autonomy, Interaction, Output, State
 from tussle.batch import Batch, InProcess
-from tussle.errors import MissionError
+from tussle.errors import MissionError, ParameterError
 from tussle.mission import read_mission, to_python, to_xml
 
 
@@ -126,3 +127,73 @@ def test_a_second_seed_needs_a_time():
     points = Batch(mission(), vary={"run.reseed": [7, 8], "run.reseed_time": [0.5]}, runs=1)
     results = points.play(executor=InProcess())
     assert results.runs.column("end").to_pylist() == ["time", "time"]
+
+
+def draws_of(sim, n=10):
+    """The draw of the entity in each step, of each world, and the hash of each world at the end."""
+    drawn = []
+    for _ in range(n):
+        sim.step()
+        drawn.append(sim.read("a.Draws.drawn")[0][:, 0].tolist())
+    return np.array(drawn), [result.state_hash for result in sim.run()]
+
+
+def test_a_branch_is_the_same_game_up_to_its_step_and_then_has_other_luck():
+    """Alone, in a stack, after a snapshot, and as a mission of its own, with the same bits."""
+    late = block("late", count=3, autonomy=Draws(), variance=(100.0, 100.0, 0.0), rate=20.0, first_birth=0.4)
+    game = mission(block(autonomy=Draws()), late, interactions=[WorldDraws()])
+    whole, hashes = draws_of(Simulation(game, [1]))
+    of_7, _ = draws_of(Simulation(game, [7]))
+    stack = Simulation(game, [5, 6, 8])
+    stack.reset([1, 2], [1, 1], rekeys=[((4, 7),), ()])
+    saved = stack.snapshot()
+    together, (_, branched, again) = draws_of(stack)
+    assert (together[:4, 1] == whole[:4, 0]).all()
+    assert (together[4:, 1] == of_7[4:, 0]).all()
+    assert (again, (together[:, 2] == whole[:, 0]).all()) == (hashes[0], True)
+    assert branched != again
+    stack.restore(saved)
+    stack.step(3)
+    assert draws_of(stack, 7)[1][1] == branched
+    own = Simulation(game.replace(rekeys=((4, 7),)), [1])
+    states = []
+    own.observers.append(lambda s: states.append(s.read("late.pos")[0]))
+    assert draws_of(own)[1] == [branched]
+    unlike = Simulation(game, [1])
+    unlike.observers.append(
+        lambda s: (
+            np.testing.assert_array_equal(s.read("late.pos")[0], states[int(s.steps[0])])
+            if s.steps[0] <= 4
+            else None
+        )
+    )
+    unlike.run()  # also what is born in step 4 is the same
+    stack.reset([1])
+    assert stack.state.rekeys == {}
+
+
+def test_rekeys_of_a_mission_file(tmp_path):
+    game = read(tmp_path, ' rekeys="4:7 9:18446744073709551615"').mission
+    assert game.rekeys == ((4, 7), (9, 2**64 - 1))
+    path = tmp_path / "again.xml"
+    path.write_text(to_xml(game, 3))
+    assert read_mission(path).mission.rekeys == game.rekeys
+    assert "rekeys=((4, 7)" in to_python(game)
+
+
+@pytest.mark.parametrize(
+    "text", ["", "4", "4:7 4:8", "9:1 4:1", "-1:3", "4:18446744073709551616", "4294967296:1"]
+)
+def test_rekeys_that_are_none(text, tmp_path):
+    with pytest.raises(MissionError, match="pairs of a step and a key"):
+        read(tmp_path, f' rekeys="{text}"')
+
+
+def test_rekeys_in_python_that_are_none():
+    game = mission(block(autonomy=Draws()))
+    for wrong in ([(4, 7.5)], [(4, True)], [4, 7], 3, [(4, -1)]):
+        with pytest.raises(MissionError, match="rekeys = "):
+            game.replace(rekeys=wrong)
+    sim = Simulation(game, [1, 2])
+    with pytest.raises(ParameterError, match="rekeys of 1 for 2 worlds"):
+        sim.reset([0, 1], rekeys=[()])

@@ -1,0 +1,186 @@
+"""`tussle stress`: play games against a specification, and show how they fail."""
+
+from __future__ import annotations
+
+import math
+import shlex
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tussle.batch.statistics import scipy_package
+from tussle.cli.batch import command_line
+from tussle.cli.batch_options import StressOptions
+from tussle.cli.interrupt import Interrupt, Interrupted
+from tussle.cli.options import show_notes
+from tussle.cli.progress import ProgressMeter, compiling
+from tussle.cli.tables import fact_list, number_tables, title
+from tussle.cli.terminal import OK, put, say, say_note
+from tussle.stress.chances import Chance
+from tussle.stress.games import Played
+from tussle.stress.study import FAILURES, MAX_FAILURES, Probability, Sample, Stress
+
+MAX_SHOWN = 5
+"""Failing games that the end of a study shows."""
+
+
+def stress(options: StressOptions) -> int:
+    """Play the games of a study, or those that are missing, and show the result.
+
+    Returns:
+        The exit code.
+    """
+    scipy_package()  # if it is missing, the user learns it before the games are played
+    study = Stress(
+        options.mission,
+        options.spec,
+        first_seed=1 if options.seed is None else options.seed,
+        settings=options.given,
+        plugin_files=tuple(options.plugin_files),
+        ends_by_time=options.end is not None,
+        run_timeout=options.run_timeout,
+        strict=options.strict,
+        allow_large=options.allow_large,
+        compat=options.compat,
+        search=list(map(str, options.data_path)),
+    )
+    show_notes(study.batch.loaded)
+    directory = options.directory or study.default_directory()
+    n = 0
+    with ExitStack() as stack:
+        with compiling():
+            study.check()
+        interrupt = stack.enter_context(Interrupt())
+        meter = stack.enter_context(ProgressMeter(study.batch.name, "games"))
+
+        def on_game(_: Played) -> None:
+            nonlocal n
+            n += 1
+            interrupt.check()
+            meter.show(n, None if options.probability else options.games)
+
+        how: dict[str, Any] = {"processes": options.processes, "stack": options.stack, "on_game": on_game}
+        try:
+            if options.probability:
+                found = study.probability(options.particles, options.repetitions, directory=directory, **how)
+            else:
+                sample = study.sample(options.games, directory=directory, **how)
+            failures = found.failures if options.probability else sample.failures
+            lost = study.chances(failures[0], directory=directory, **how) if options.why and failures else []
+        except Interrupted:
+            say(
+                "interrupted",
+                f"{n:,} games are kept in {directory}; the same command continues",
+                "bold yellow",
+            )
+            return interrupt.code
+    if options.probability:
+        show_probability(found, study, directory, options)
+    else:
+        show_sample(sample, study, directory, options)
+    if lost:
+        show_chances(lost, study)
+    return OK
+
+
+def show_sample(sample: Sample, study: Stress, directory: Path, options: StressOptions) -> None:
+    """Show how many games failed, and the worst of them."""
+    n, n_failed = len(sample.games), len(sample.failures)
+    finite = sample.robustness[np.isfinite(sample.robustness)]
+    quantiles = ", ".join(f"{q:.4g}" for q in np.quantile(finite, (0.0, 0.05, 0.5))) if len(finite) else ""
+    put(
+        "",
+        title(study.batch.name, str(study.specification)),
+        fact_list(
+            [
+                ("failed", f"{n_failed:,} of {n:,} games, {share(sample.value, sample.low, sample.high)}"),
+                ("robustness", quantiles and f"{quantiles} (least, 5 %, median)"),
+                ("study", str(directory)),
+                ("next", "" if n_failed else f"{again(options)} --probability"),
+            ]
+        ),
+    )
+    show_failures(sample.failures, study, directory, options)
+
+
+def show_probability(found: Probability, study: Stress, directory: Path, options: StressOptions) -> None:
+    """Show the probability of a failure, what it took, and the worst games."""
+    plain = found.n_plain
+    gain = f"; plain games would be {plain:,.0f} for the same error" if math.isfinite(plain) else ""
+    complete = [r for r in found.repetitions if not r.is_extinct]
+    ancestors = f"{np.median([r.n_ancestors for r in complete]):.0f} of {found.n}" if complete else ""
+    put(
+        "",
+        title(
+            study.batch.name,
+            str(study.specification),
+            f"{len(found.repetitions)} repetitions of {found.n} games at a time",
+        ),
+        fact_list(
+            [
+                ("probability of failure", share(found.value, found.low, found.high)),
+                ("games", f"{found.n_games:,}{gain}"),
+                ("time", f"{found.game_s:,.0f} s of games in {found.cpu_s:,.1f} s of CPU time"),
+                ("levels", f"{np.median([len(r.levels) for r in found.repetitions]):.0f} in a repetition"),
+                ("ancestors", ancestors and f"{ancestors} first games of a repetition have failing branches"),
+                ("study", str(directory)),
+            ]
+        ),
+    )
+    show_failures(found.failures, study, directory, options)
+    for note in found.notes:
+        say_note(note)
+
+
+def show_failures(failures: list[Played], study: Stress, directory: Path, options: StressOptions) -> None:
+    """Show the worst games, and how to see one."""
+    if not failures:
+        return
+    rows = [
+        (
+            "",
+            [
+                f"{FAILURES}/{i}.xml",
+                f"{each.verdict.robustness:.6g}",
+                f"{(each.verdict.first_below(0.0) or 0) * study.mission.dt:.6g}",
+                str(each.game.seed),
+                str(len(each.game.rekeys)),
+            ],
+        )
+        for i, each in enumerate(failures[:MAX_SHOWN])
+    ]
+    put(*number_tables(["game", "robustness", "fails at [s]", "seed", "branches"], rows))
+    if len(failures) > MAX_SHOWN:
+        put(f" the worst {MAX_SHOWN} of {len(failures):,}; {min(len(failures), MAX_FAILURES)} are kept")
+    files = "".join(f" --plugin-path {shlex.quote(str(p))}" for p in options.plugin_files)
+    put("", f" tussle run {shlex.quote(str(directory / FAILURES / '0.xml'))}{files}")
+
+
+def show_chances(lost: list[Chance], study: Stress) -> None:
+    """Show how likely the failure of the worst game was from each moment on."""
+    rows = [
+        (
+            "",
+            [
+                f"{study.mission.start + each.step * study.mission.dt:.6g}",
+                share(each.value, each.low, each.high),
+            ],
+        )
+        for each in lost
+    ]
+    put(*number_tables(["from t [s] on", "branches that fail"], rows))
+    put(
+        f" of {lost[0].n} branches of {FAILURES}/0.xml from each moment, with other luck; in parentheses: 95 % intervals"
+    )
+
+
+def again(options: StressOptions) -> str:
+    """The command that was run."""
+    return shlex.join(command_line())
+
+
+def share(value: float, low: float, high: float) -> str:
+    """A probability with its interval, to two digits."""
+    return f"{value:.2g} ({low:.2g}–{high:.2g})"

@@ -1,0 +1,21 @@
+"""What must hold in a game, how near games come to breaking it, and how likely that is: specifications, rare events, worst games."""
+
+from tussle.stress.chances import Chance
+from tussle.stress.games import Played, StressGame
+from tussle.stress.monitor import Monitor, Verdict
+from tussle.stress.specification import Specification
+from tussle.stress.splitting import Repetition
+from tussle.stress.study import Probability, Sample, Stress
+
+__all__ = [
+    "Chance",
+    "Monitor",
+    "Played",
+    "Probability",
+    "Repetition",
+    "Sample",
+    "Specification",
+    "Stress",
+    "StressGame",
+    "Verdict",
+]

@@ -1,0 +1,154 @@
+"""The robustness of each game of a stack, from its signals at each step."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from tussle.api.bodies import Bodies
+from tussle.engine.simulation import Simulation
+from tussle.mission import Mission
+from tussle.stress.formulas import records
+from tussle.stress.signals import ChosenRows, StepView
+from tussle.stress.specification import Function, Specification, columns_of
+
+ROOM = 256
+"""Samples for which there is room at first."""
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """How far a game was from breaking its specification.
+
+    Attributes:
+        robustness: Distance from failure, in the unit of what is compared; negative for a failure.
+        steps: Steps at which the robustness that is known to be reached at most falls, ascending.
+        levels: What it falls to; the last is the robustness.
+    """
+
+    robustness: float
+    steps: list[int]
+    levels: list[float]
+
+    @property
+    def has_failed(self) -> bool:
+        """The specification is broken."""
+        return self.robustness < 0.0
+
+    def first_below(self, level: float) -> int | None:
+        """The first step at which the game is known to be nearer to failure than a level; None for never."""
+        return next((k for k, found in zip(self.steps, self.levels, strict=True) if found < level), None)
+
+
+class Monitor:
+    """Reads the signals of a specification at the start of each step and at the end of each world of a simulation.
+
+    A game is not changed by it. Also a `Watcher` of a batch.
+
+    Args:
+        specification: What must hold.
+        sim: The simulation, before its first step.
+    """
+
+    def __init__(self, specification: Specification, sim: Simulation) -> None:
+        self.specification, self.sim = specification, sim
+        self._signals = list(specification.signals.values())
+        self._samples = np.full((len(self._signals), ROOM, sim.n_worlds), np.nan)
+        self._rows = ChosenRows(sim.state.population.bodies)
+        self._verdicts: dict[int, Verdict] = {}
+        sim.observers.append(self._observe)
+
+    def restart(self, worlds: Iterable[int]) -> None:
+        """Forget what was seen of worlds that have been reset."""
+        for world in worlds:
+            self._verdicts.pop(int(world), None)
+
+    def _observe(self, sim: Simulation) -> None:
+        if not self._signals:
+            return
+        state, bodies = sim.state, sim.state.population.bodies
+        clock = state.context.clock
+        if bodies.ints is not self._rows.ints:
+            self._rows = ChosenRows(bodies)
+        frame = StepView(sim, bodies, self._rows)
+        if state.n_running == state.n_worlds and clock.common >= 0:
+            self._grow(clock.common)
+            for i, signal in enumerate(self._signals):
+                self._samples[i, clock.common] = signal.evaluate(frame)
+            return
+        running = np.flatnonzero(state.running)
+        steps = clock.step[running]
+        self._grow(int(steps.max(initial=0)))
+        for i, signal in enumerate(self._signals):
+            self._samples[i, steps, running] = signal.evaluate(frame)[running]
+
+    def _grow(self, step: int) -> None:
+        room = self._samples.shape[1]
+        if step >= room:
+            more = np.full((len(self._signals), max(room, step + 1 - room), self.sim.n_worlds), np.nan)
+            self._samples = np.concatenate([self._samples, more], axis=1)
+
+    def trace(self, world: int) -> dict[str, np.ndarray]:
+        """Values of each signal at the start of each step of a world, and now, (n_samples,)."""
+        sim, step = self.sim, int(self.sim.state.context.clock.step[world])
+        self._grow(step)
+        bodies: Bodies = sim.state.population.bodies
+        if not sim.state.running[world] and world in sim.state.parked:
+            bodies = sim.state.parked[world].bodies
+        frame = StepView(sim, bodies, ChosenRows(bodies))
+        for i, signal in enumerate(self._signals):
+            self._samples[i, step, world] = signal.evaluate(frame)[world]
+        return {str(s): self._samples[i, : step + 1, world].copy() for i, s in enumerate(self._signals)}
+
+    def finish(self, world: int) -> Verdict:
+        """The verdict on a world: final where it has ended, else on the game so far.
+
+        Raises:
+            ParameterError: A signal is not a number, or games have no such quantity.
+        """
+        if world not in self._verdicts:
+            result = self.sim.state.results[world]
+            is_over = not self.sim.state.running[world]
+            if result is None or not is_over:
+                result = self.sim.result(is_hashed=False)[world]
+            known = self.specification.known(self.trace(world), columns_of(result))
+            steps, levels = records(known)
+            if not len(steps):  # nothing is compared, as in windows after the end
+                steps, levels = np.array([0]), np.array([np.inf])
+            verdict = Verdict(float(known[-1]), steps.tolist(), levels.tolist())
+            if not is_over:
+                return verdict
+            self._verdicts[world] = verdict
+        return self._verdicts[world]
+
+    def robustness(self) -> np.ndarray:
+        """Robustness of each world, (n_worlds,): of the whole game where it has ended, else of the game so far."""
+        return np.array([self.finish(world).robustness for world in range(self.sim.n_worlds)])
+
+
+@dataclass(frozen=True)
+class Watching:
+    """Makes the monitor of a simulation; pickles, for other processes.
+
+    Attributes:
+        given: The specification: a text, or a function that is to be positive.
+        functions: Its signals that are functions.
+    """
+
+    given: str | Function
+    functions: Mapping[str, Function] = field(default_factory=dict)
+
+    def specification(self, mission: Mission) -> Specification:
+        """The specification of a mission.
+
+        Raises:
+            ParameterError: It is none.
+        """
+        if isinstance(self.given, str):
+            return Specification.parse(self.given, mission, self.functions)
+        return Specification.of_function(self.given, mission)
+
+    def __call__(self, sim: Simulation) -> Monitor:
+        return Monitor(self.specification(sim.mission), sim)

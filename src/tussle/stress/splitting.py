@@ -1,0 +1,144 @@
+"""Adaptive multilevel splitting: probabilities of rare failures from games that branch where they have come near.
+
+Cérou and Guyader (2007, "Adaptive multilevel splitting for rare event analysis"); the form for ties and discrete time whose estimate is
+unbiased for any number of games and any score: Bréhier et al. (2016, "Unbiasedness of some generalized adaptive multilevel splitting
+algorithms"), section 3. The score of a game at a step is the negative of its robustness as known there, which never falls.
+
+A repetition plays n games. In each round, those that stayed farthest from failure are replaced by branches of others: each is the game of
+a random survivor up to the first step at which it was nearer to failure than the level of the round, and then has other luck. A branch is
+a game of its own, with a seed and re-keys; its states up to the branch are computed again, bit for bit.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Generator, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from tussle.batch.statistics import LEVEL, scipy_package
+from tussle.numeric import exp, log, total
+from tussle.numeric.rng import stream_key, uniform
+from tussle.stress.games import Played, StressGame
+
+CHOICE = stream_key("stress", "survivor")
+
+Play = Callable[[Sequence[StressGame]], Sequence[Played]]
+
+
+@dataclass
+class Repetition:
+    """One run of the algorithm, independent of the others.
+
+    Attributes:
+        number: Its number.
+        probability: Its estimate.
+        levels: Robustness at which games were replaced, of each round.
+        shares: Part of the games that was replaced, of each round.
+        n_games: Games that it played.
+        n_ancestors: Games of the start from which those at the end descend.
+        failures: Games at the end that failed.
+    """
+
+    number: int
+    probability: float = 1.0
+    levels: list[float] = field(default_factory=list)
+    shares: list[float] = field(default_factory=list)
+    n_games: int = 0
+    n_ancestors: int = 0
+    failures: list[Played] = field(default_factory=list)
+
+    @property
+    def is_extinct(self) -> bool:
+        """At some level no game came nearer to failure, so that none was left."""
+        return self.probability == 0.0
+
+
+def repetition(
+    number: int, n: int, n_replaced: int, first_seed: int, result: Repetition
+) -> Generator[list[StressGame], Sequence[Played], None]:
+    """One run of the algorithm: yields games, and is sent how they went.
+
+    Args:
+        number: Its number: of the seeds, and of its draws.
+        n: Games at a time.
+        n_replaced: Games that are replaced in a round, or more where there are ties.
+        first_seed: Seed of the first game of repetition 0.
+        result: Receives what comes of it.
+    """
+    games = [StressGame((first_seed + number * n + i) % 2**64) for i in range(n)]
+    played = list((yield games))
+    result.n_games = n
+    round_ = 0
+    while True:
+        robustness = np.array([p.verdict.robustness for p in played])
+        level = float(np.sort(robustness)[n - n_replaced])
+        if level < 0.0:
+            break
+        is_lost = robustness >= level
+        survivors = [p for p, lost in zip(played, is_lost, strict=True) if not lost]
+        lost = np.flatnonzero(is_lost)
+        result.levels.append(level)
+        result.shares.append(len(lost) / n)
+        result.probability *= len(survivors) / n
+        if not survivors:
+            return
+        draws = uniform(first_seed % 2**64, CHOICE, lost, np.full(len(lost), round_), number)[0]
+        branches = []
+        for place, draw in zip(lost.tolist(), draws.tolist(), strict=True):
+            parent = survivors[min(int(draw * len(survivors)), len(survivors) - 1)]
+            step = parent.verdict.first_below(level)
+            assert step is not None
+            key = stream_key("stress", "branch", f"{first_seed} {number} {round_} {place}")
+            branches.append(parent.game.branch(step, key))
+        for place, branch in zip(lost.tolist(), (yield branches), strict=True):
+            played[place] = branch
+        result.n_games += len(lost)
+        round_ += 1
+    result.failures = [p for p in played if p.verdict.has_failed]
+    result.n_ancestors = len({p.game.seed for p in played})
+    result.probability *= len(result.failures) / n
+
+
+def split(play: Play, n: int, n_replaced: int, repetitions: int, first_seed: int) -> list[Repetition]:
+    """Run the algorithm several times; the games of a round of all of them are played together.
+
+    Args:
+        play: Plays games.
+        n: Games at a time, of each repetition.
+        n_replaced: Games that are replaced in a round.
+        repetitions: How often.
+        first_seed: Seed of the first game.
+    """
+    results = [Repetition(number) for number in range(repetitions)]
+    under_way = {r.number: repetition(r.number, n, n_replaced, first_seed, r) for r in results}
+    asked = {number: next(one) for number, one in under_way.items()}
+    while asked:
+        played = list(play([game for games in asked.values() for game in games]))
+        first, following = 0, {}
+        for number, games in asked.items():
+            with suppress(StopIteration):
+                following[number] = under_way[number].send(played[first : first + len(games)])
+            first += len(games)
+        asked = following
+    return results
+
+
+def interval(estimates: Sequence[float]) -> tuple[float, float, float]:
+    """Mean of independent estimates of a probability, and its 95 % interval.
+
+    Student's interval for the logarithm of the mean, with the mean's relative standard error: estimates of splitting are skewed to the
+    right, by the same factor whatever the probability. (0, 0, 1) if all are zero: see `Probability`.
+    """
+    values = np.asarray(estimates, dtype=np.float64)
+    n, mean = len(values), float(total(values)) / len(values)
+    if mean == 0.0:
+        return 0.0, 0.0, 1.0
+    if n < 2:
+        return mean, 0.0, 1.0
+    deviation = math.sqrt(float(total((values - mean) ** 2)) / (n - 1))
+    half = float(scipy_package().special.stdtrit(n - 1, 0.5 + LEVEL / 2.0)) * deviation / math.sqrt(n) / mean
+    low, high = (float(exp(log(mean) + sign * half)) for sign in (-1.0, 1.0))
+    return mean, low, min(high, 1.0)

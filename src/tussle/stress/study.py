@@ -1,0 +1,375 @@
+"""A study of a mission's failures: how often it breaks a specification, in plain games and by splitting."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import nullcontext
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tussle.batch import by_value
+from tussle.batch.batch import Batch
+from tussle.batch.statistics import wilson
+from tussle.batch.store import reported
+from tussle.documents import Whole, check_argument, json_text
+from tussle.engine.simulation import Simulation
+from tussle.errors import ParameterError
+from tussle.mission import Mission, to_xml
+from tussle.numeric import total
+from tussle.record.run_file import plain, put_whole, versions
+from tussle.stress.chances import Chance, chances
+from tussle.stress.games import GamePlayer, Ledger, Played, StressGame
+from tussle.stress.monitor import Watching
+from tussle.stress.specification import Function, Specification, columns_of
+from tussle.stress.splitting import Repetition, interval, split
+
+RESULT_FILE, FAILURES = "result.json", "failures"
+MAX_FAILURES = 10
+"""Failing games that are written as missions."""
+MANY = 0.5
+"""Part of the games that a round of splitting may replace before a note says so."""
+MIN_ANCESTORS = 5
+
+
+@dataclass
+class Sample:
+    """Plain games of a mission.
+
+    Attributes:
+        games: How they went.
+        low: Lower end of Wilson's 95 % interval of the probability of failure.
+        high: Its upper end.
+    """
+
+    games: list[Played]
+    low: float
+    high: float
+
+    @property
+    def failures(self) -> list[Played]:
+        """Games that failed, the worst first."""
+        return worst_first(p for p in self.games if p.verdict.has_failed)
+
+    @property
+    def value(self) -> float:
+        """Part of the games that failed."""
+        return len(self.failures) / len(self.games)
+
+    @property
+    def robustness(self) -> np.ndarray:
+        """Robustness of each game, (n,)."""
+        return np.array([p.verdict.robustness for p in self.games])
+
+
+@dataclass
+class Probability:
+    """The probability that a game fails, by adaptive multilevel splitting.
+
+    Attributes:
+        value: The estimate, whose mean is the probability.
+        low: Lower end of its 95 % interval, from independent repetitions.
+        high: Its upper end.
+        repetitions: The repetitions.
+        n: Games at a time, of each repetition.
+        game_s: Length of all games that were played [s].
+        cpu_s: Their CPU time [s].
+        failures: Different failing games, the worst first.
+        notes: What to know about the result.
+    """
+
+    value: float
+    low: float
+    high: float
+    repetitions: list[Repetition]
+    n: int
+    game_s: float
+    cpu_s: float
+    failures: list[Played]
+    notes: list[str] = field(default_factory=list)
+
+    @property
+    def n_games(self) -> int:
+        """Games of all repetitions, branches included."""
+        return int(np.sum([r.n_games for r in self.repetitions]))
+
+    @property
+    def n_plain(self) -> float:
+        """Games that an estimate without splitting needs for the same relative standard error; NaN where that is not known."""
+        estimates = np.array([r.probability for r in self.repetitions])
+        variance = float(total((estimates - self.value) ** 2)) / max(len(estimates) - 1, 1) / len(estimates)
+        return self.value * (1.0 - self.value) / variance if variance > 0.0 else float("nan")
+
+
+class Stress:
+    """A mission and a specification that its games must keep.
+
+    Args:
+        mission: A mission file, the name of one that ships, or a `Mission`.
+        specification: What must hold: a text as of `Specification.parse`, or a function of the simulation that returns one number per
+            world, positive at all steps of a good game.
+        functions: Signals that the text calls as name(): functions like that.
+        first_seed: Seeds of the games count up from here.
+        settings: Values that are set, as for `read_mission` or by path.
+        plugin_files: Python files whose plugins the mission file may name.
+        ends_by_time: The game ends at its end time whatever the mission says.
+        run_timeout: Wall time that a game may take [s], as for `Batch`.
+        options: Further options of `read_mission`.
+
+    Raises:
+        ParameterError: The specification is none, or names what the mission does not have.
+        MissionError: The mission cannot be read.
+    """
+
+    def __init__(
+        self,
+        mission: str | Path | Mission,
+        specification: str | Function,
+        *,
+        functions: Mapping[str, Function] | None = None,
+        first_seed: int = 1,
+        settings: Mapping[str, Any] | None = None,
+        plugin_files: Sequence[str | Path] = (),
+        ends_by_time: bool = False,
+        run_timeout: float | None = None,
+        **options: Any,
+    ) -> None:
+        check_argument("first_seed", first_seed, Whole(0, 2**64 - 1))
+        self.first_seed = first_seed
+        self.batch = Batch(
+            mission, runs=1, first_seed=first_seed, settings=settings, plugin_files=plugin_files,
+            ends_by_time=ends_by_time, run_timeout=run_timeout, **options,
+        )  # fmt: skip
+        self.watching = Watching(specification, dict(functions or {}))
+        self.specification: Specification = self.watching.specification(self.mission)
+
+    @property
+    def mission(self) -> Mission:
+        """The mission."""
+        return self.batch.mission
+
+    @cached_property
+    def info(self) -> dict[str, Any]:
+        """The content of `stress.json`."""
+        code = (
+            ""
+            if isinstance(self.watching.given, str) and not self.watching.functions
+            else by_value.dumps(self.watching).hex()
+        )
+        contents = {
+            "tussle": versions()["tussle"],
+            "name": self.batch.name,
+            "mission": self.batch.info()["mission"],
+            "specification": str(self.specification),
+            "first_seed": self.first_seed,
+        }
+        text = json.dumps([contents, self.batch.fingerprint, code], default=str)
+        return {
+            "format": 1,
+            "fingerprint": hashlib.blake2b(text.encode(), digest_size=16).hexdigest(),
+            **contents,
+        }
+
+    def default_directory(self) -> Path:
+        """The directory of this study unless another is given; the same for the same study."""
+        stem = self.batch.default_directory().name.rpartition("-")[0]
+        return Path("stress") / f"{stem}-{self.info['fingerprint'][:8]}"
+
+    def check(self) -> None:
+        """Begin a game, and look for the quantities of the specification.
+
+        Raises:
+            TussleError: The mission cannot be played.
+            ParameterError: A game has no such quantity, or a signal cannot be computed.
+        """
+        self.batch.check()
+        with Simulation(self.mission, self.first_seed) as sim:
+            monitor = self.watching(sim)
+            sim.step()
+            self.specification.check(columns_of(sim.result(is_hashed=False)[0]))
+            monitor.finish(0)
+
+    def sample(self, games: int = 1000, directory: str | Path | None = None, **how: Any) -> Sample:
+        """Play games, and see how many fail.
+
+        Args:
+            games: How many.
+            directory: Where games are kept, and from where the same study goes on; None keeps them in memory.
+            how: `executor`, `processes`, `stack` and `on_game`, as for `GamePlayer`.
+
+        Raises:
+            BatchError: A game has failed with an error, or the directory holds another study.
+        """
+        check_argument("games", games, Whole(1, 10**9))
+        self.check()
+        with self._ledger(directory) as ledger:
+            player = GamePlayer(self.batch, self.watching, ledger, **how)
+            played = player.play([StressGame((self.first_seed + i) % 2**64) for i in range(games)])
+            n_failed = len([p for p in played if p.verdict.has_failed])
+            found = Sample(played, *wilson(n_failed, games))
+            self._write(
+                ledger,
+                found.failures,
+                {"games": games, "failed": n_failed, "low": found.low, "high": found.high},
+            )
+        return found
+
+    def probability(
+        self,
+        particles: int = 100,
+        repetitions: int = 20,
+        replaced: float = 0.25,
+        directory: str | Path | None = None,
+        **how: Any,
+    ) -> Probability:
+        """Estimate the probability that a game fails by adaptive multilevel splitting.
+
+        Args:
+            particles: Games at a time, of each repetition.
+            repetitions: Independent repetitions, from which the interval follows.
+            replaced: Part of the games that a round replaces.
+            directory: Where games are kept, and from where the same study goes on; None keeps them in memory.
+            how: `executor`, `processes`, `stack` and `on_game`, as for `GamePlayer`.
+
+        Raises:
+            BatchError: A game has failed with an error, or the directory holds another study.
+            ParameterError: The mission has no randomness, or a number is not allowed.
+        """
+        check_argument("particles", particles, Whole(2, 10**6))
+        check_argument("repetitions", repetitions, Whole(2, 10**4))
+        if not 0.0 < replaced < 1.0:
+            raise ParameterError(f"replaced = {replaced!r} is not allowed; it takes a number between 0 and 1")
+        self.check()
+        with self._ledger(directory) as ledger:
+            player = GamePlayer(self.batch, self.watching, ledger, **how)
+            n_replaced = max(1, round(replaced * particles))
+            found = split(_Random(player.play), particles, n_replaced, repetitions, self.first_seed)
+            value, low, high = interval([r.probability for r in found])
+            if value == 0.0:  # none of the first games failed either
+                high = 1.0 - 0.05 ** (1.0 / (particles * repetitions))
+            failures = worst_first(p for r in found for p in r.failures)
+            result = Probability(value, low, high, found, particles, player.game_s, player.cpu_s, failures)
+            result.notes = list(self._notes(result))
+            self._write(
+                ledger,
+                failures,
+                {
+                    "probability": value, "low": low, "high": high, "particles": particles, "replaced": replaced, "notes": result.notes,
+                    "repetitions": [[r.probability, r.n_games, r.n_ancestors, r.levels] for r in found],
+                },
+            )  # fmt: skip
+        return result
+
+    def chances(
+        self,
+        failed: Played,
+        moments: int = 9,
+        branches: int = 50,
+        directory: str | Path | None = None,
+        **how: Any,
+    ) -> list[Chance]:
+        """How likely the failure of a game was from moments on: each the start of branches that repeat the game and then have other luck.
+
+        Args:
+            failed: A game of this study that failed.
+            moments: Moments, evenly spread from the start of the game to its failure.
+            branches: Branches from each.
+            directory: Where games are kept; None keeps them in memory.
+            how: `executor`, `processes`, `stack` and `on_game`, as for `GamePlayer`.
+
+        Raises:
+            BatchError: A game has failed with an error, or the directory holds another study.
+            ParameterError: The game did not fail, or a number is not allowed.
+        """
+        check_argument("moments", moments, Whole(2, 10**4))
+        check_argument("branches", branches, Whole(1, 10**6))
+        with self._ledger(directory) as ledger:
+            player = GamePlayer(self.batch, self.watching, ledger, **how)
+            return chances(player.play, failed, moments, branches)
+
+    def _notes(self, found: Probability) -> list[str]:
+        repetitions, n = found.repetitions, len(found.repetitions)
+        extinct = [r for r in repetitions if r.is_extinct]
+        notes = []
+        if not self.specification.can_guide:
+            notes.append(
+                "nothing is known of this specification before a game ends, so splitting cannot tell good games from better ones; "
+                "it needs a condition under always"
+            )
+        if len(extinct) == n:
+            notes.append(
+                f"no game failed in any repetition; the upper end is that of the {n * found.n:,} games at the start alone"
+            )
+        elif extinct:
+            notes.append(
+                f"{len(extinct)} of {n} repetitions died out before a failure; more --particles make the result surer"
+            )
+        jumps = [r for r in repetitions if any(share > MANY for share in r.shares)]
+        if len(jumps) > n // 2:
+            notes.append(
+                f"in {len(jumps)} of {n} repetitions a round replaced more than half of the games at once: many come equally near, "
+                "and branches do not come nearer by other luck"
+            )
+        ancestors = [r.n_ancestors for r in repetitions if not r.is_extinct]
+        if ancestors and np.median(ancestors) < MIN_ANCESTORS:
+            notes.append(
+                f"the failing games of a repetition descend from {np.median(ancestors):.0f} of its {found.n} first games: what is decided "
+                "at the start of a game is seen through few of them; more --particles make the result surer"
+            )
+        return notes
+
+    def _ledger(self, directory: str | Path | None) -> Any:
+        return nullcontext() if directory is None else Ledger(Path(directory), self.info)
+
+    def failing_mission(self, game: StressGame) -> str:
+        """A mission file that plays a game again, with its seed and its luck."""
+        return to_xml(self.batch.missions[game.point].replace(rekeys=game.rekeys), game.seed)
+
+    def _write(self, ledger: Ledger | None, failures: Sequence[Played], result: Mapping[str, Any]) -> None:
+        """Write the result, and the worst failures as missions."""
+        if ledger is None:
+            return
+        folder, listed = ledger.path / FAILURES, []
+        with reported(ledger.path):
+            for number, each in enumerate(failures[:MAX_FAILURES]):
+                folder.mkdir(exist_ok=True)
+                put_whole(folder / f"{number}.xml", self.failing_mission(each.game))
+                listed.append(
+                    {
+                        "file": f"{FAILURES}/{number}.xml",
+                        "robustness": each.verdict.robustness,
+                        "state_hash": each.state_hash,
+                    }
+                )
+            put_whole(ledger.path / RESULT_FILE, json_text(dict(plain({**result, "failures": listed}))))
+
+
+class _Random:
+    """Plays games, and refuses a mission whose first games are all equal."""
+
+    def __init__(self, play: Callable[[Sequence[StressGame]], list[Played]]) -> None:
+        self._play, self._is_first = play, True
+
+    def __call__(self, games: Sequence[StressGame]) -> list[Played]:
+        played = self._play(games)
+        if self._is_first and len({p.state_hash for p in played}) == 1:
+            raise ParameterError(
+                f"all of {len(games):,} games with different seeds are equal: the mission has no randomness, and nothing is rare"
+            )
+        self._is_first = False
+        return played
+
+
+def worst_first(games: Any) -> list[Played]:
+    """Different games, the worst first: of those that branched from one game only the worst."""
+    best: dict[tuple[int, int], Played] = {}
+    for played in games:
+        key = played.game.point, played.game.seed
+        if key not in best or played.verdict.robustness < best[key].verdict.robustness:
+            best[key] = played
+    return sorted(best.values(), key=lambda p: p.verdict.robustness)

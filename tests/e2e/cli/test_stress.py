@@ -1,0 +1,67 @@
+"""`tussle stress`: what it prints, keeps, continues and refuses."""
+
+from __future__ import annotations
+
+import json
+import re
+import signal
+import subprocess
+import time
+from pathlib import Path
+
+import pytest
+from cli_process import COMMAND, environment
+
+EXAMPLE = Path(__file__).parents[3] / "examples/stress"
+STUDY = (
+    *("stress", EXAMPLE / "pads.xml", "--plugin-path", EXAMPLE / "hover.py", "--end", "6"),
+    *("--spec", "always (distance(left, right) > 3 m)", "--processes", "1", "--out", "out"),
+)
+SPLIT = (*STUDY, "--probability", "--particles", "20", "--repetitions", "4")
+
+
+def test_a_study_from_question_to_a_failing_game(tussle, folder):
+    done = tussle(*SPLIT, "--why")
+    assert re.search(r"probability of failure +\S+ \(\S+–\S+\)", done.stdout)
+    assert "plain games would be" in done.stdout
+    command = " ".join(done.stdout.split()).partition(" tussle run ")[2].partition(" from t ")[0]
+    listed = json.loads((folder / "out/result.json").read_text())["failures"]
+    played = tussle("run", *command.split())
+    assert listed[0]["state_hash"] in played.stdout
+    assert "branches that fail" in done.stdout
+    assert re.search(r" 1 \(0\.\d+–1\)", done.stdout)
+    plain = tussle(*STUDY, "-n", "30")
+    assert re.search(r"failed +\d+ of 30 games", plain.stdout)
+    assert re.search(r"robustness +\S+, \S+, \S+ \(least", plain.stdout)
+    assert len((folder / "out/games.jsonl").read_text().splitlines()) >= 80
+
+
+def test_a_study_that_is_killed_goes_on(process, tussle, folder):
+    """And ends as one that was not."""
+    command = [*COMMAND, *map(str, SPLIT)]
+    for wait in (3.0, 5.0):
+        with subprocess.Popen(
+            command, cwd=folder, env=environment(), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+        ) as one:
+            time.sleep(wait)
+            one.send_signal(signal.SIGKILL)
+    process(*SPLIT)
+    result = (folder / "out/result.json").read_text()
+    tussle(*SPLIT[:-1], "4", "--out", "other")
+    assert (folder / "other/result.json").read_text() == result
+
+
+@pytest.mark.parametrize(
+    ("changes", "message", "code"),
+    [
+        (("--spec", ""), "--spec is missing", 2),
+        (("--spec", "always (distance(left, right) > 3 s)"), "m and s cannot be compared", 1),
+        (("--spec", "scores[1] > 3"), "there is no 'scores", 1),
+        (("--spec", "always (nothing(left) > 3)"), "there is no signal 'nothing'", 1),
+        (("--set", "left.Hover.gust=0", "--set", "right.Hover.gust=0", "--probability"), "no randomness", 1),
+    ],
+)
+def test_what_is_refused_is_said_in_one_sentence(tussle, changes, message, code):
+    done = tussle(*STUDY, *changes, code=code)
+    assert message in " ".join(done.stderr.split())
+    assert "Traceback" not in done.stderr

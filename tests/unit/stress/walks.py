@@ -1,0 +1,129 @@
+"""Random processes with known probabilities, as games whose draws change where a game branches."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tussle.numeric.rng import normal, stream_key, uniform
+from tussle.stress import Played, Verdict
+from tussle.stress.formulas import records
+
+STREAM = stream_key("walk")
+
+
+def playing(path, steps):
+    """A function that plays games of a process: path(normals, uniforms), (n, steps) each, returns robustness, (n, steps + 1)."""
+
+    def play(games):
+        keys = np.empty((len(games), steps), np.uint64)
+        for row, game in zip(keys, games, strict=True):
+            row[:] = game.seed
+            for step, key in game.rekeys:
+                row[step:] = key
+        at = np.tile(np.arange(steps), len(games))
+        z = normal(keys.ravel(), STREAM, 0, at)[0].reshape(-1, steps)
+        u = uniform(keys.ravel(), STREAM + 1, 0, at)[0].reshape(-1, steps)
+        found = []
+        for game, row in zip(games, np.minimum.accumulate(path(z, u), axis=1), strict=True):
+            falls, levels = records(row)
+            verdict = Verdict(float(row[-1]), falls.tolist(), levels.tolist())
+            found.append(Played(game, verdict, float(steps), 0.0, f"{game.name}"))
+        return found
+
+    return play
+
+
+def brownian(p):
+    """First passage of Brownian motion within time 1: P = 2 (1 - Phi(b)), by the reflection principle.
+
+    The maximum within a step is drawn from its exact law, that of a bridge.
+    """
+    from scipy.stats import norm
+
+    steps, b = 60, norm.isf(p / 2)
+
+    def path(z, u):
+        dx = z / np.sqrt(steps)
+        x = np.cumsum(dx, axis=1)
+        top = 0.5 * (2 * x - dx + np.sqrt(dx**2 - 2.0 / steps * np.log1p(-u)))
+        return b - np.concatenate([np.zeros((len(z), 1)), top], axis=1)
+
+    return playing(path, steps), p
+
+
+def ornstein_uhlenbeck(p):
+    """First passage of an Ornstein-Uhlenbeck process at 40 times, from its mean; the law by quadrature of its transition density."""
+    from scipy.optimize import brentq
+    from scipy.stats import norm
+
+    steps, a = 40, 0.9
+    s = np.sqrt(1 - a * a)
+
+    def passage(b):
+        x, w = np.polynomial.legendre.leggauss(400)
+        y, w = 0.5 * (b + 9) * x + 0.5 * (b - 9), 0.5 * (b + 9) * w
+        density = norm.pdf(y / s) / s
+        kernel = norm.pdf((y[:, None] - a * y[None]) / s) / s
+        out = norm.sf(b / s)
+        for _ in range(steps - 1):
+            out += (w * density) @ norm.sf((b - a * y) / s)
+            density = kernel @ (w * density)
+        return out
+
+    b = brentq(lambda b: np.log(passage(b) / p), 0.5, 9.0)
+
+    def path(z, u):
+        x, out = np.zeros(len(z)), [np.full(len(z), b)]
+        for k in range(steps):
+            x = a * x + s * z[:, k]
+            out.append(b - x)
+        return np.stack(out, axis=1)
+
+    return playing(path, steps), p
+
+
+def chain(p):
+    """A chain of three states that reaches the last within 30 steps: a power of its matrix. Its score has only ties."""
+    from scipy.optimize import brentq
+
+    steps, back = 30, 0.3
+
+    def reached(q):
+        matrix = np.array([[1 - q, q, 0.0], [back, 1 - back - q, q], [0.0, 0.0, 1.0]])
+        return np.linalg.matrix_power(matrix, steps)[0, 2]
+
+    q = brentq(lambda q: np.log(reached(q) / p), 1e-9, 0.6)
+
+    def path(z, u):
+        x, out = np.zeros(len(u), int), [np.full(len(u), 1.5)]
+        for k in range(steps):
+            up = (x < 2) & (u[:, k] < q)
+            down = (x == 1) & (u[:, k] > 1 - back)
+            x = x + up - down
+            out.append(1.5 - x)
+        return np.stack(out, axis=1)
+
+    return playing(path, steps), p
+
+
+def gap(p):
+    """Two walkers on a line that meet within 32 steps: their gap is a simple walk of twice as many, by the reflection principle."""
+    from scipy.stats import binom
+
+    steps = 32
+
+    def meets(g):
+        return binom.sf((2 * steps + g) / 2 - 1, 2 * steps, 0.5) + binom.sf(
+            (2 * steps + g) / 2, 2 * steps, 0.5
+        )
+
+    g = min(range(2, 2 * steps, 2), key=lambda g: abs(np.log(meets(g) / p)))
+
+    def path(z, u):
+        moves = np.where(u < 0.25, -2, np.where(u < 0.5, 2, 0))
+        return np.concatenate([np.full((len(u), 1), g), g + np.cumsum(moves, axis=1)], axis=1) - 1.0
+
+    return playing(path, steps), float(meets(g))
+
+
+PROCESSES = (brownian, ornstein_uhlenbeck, chain, gap)
