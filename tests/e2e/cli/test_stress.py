@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import shlex
 import signal
 import subprocess
 import time
@@ -26,7 +27,7 @@ def test_a_study_from_question_to_a_failing_game(tussle, folder):
     assert "plain games would be" in done.stdout
     command = " ".join(done.stdout.split()).partition(" tussle run ")[2].partition(" from t ")[0]
     listed = json.loads((folder / "out/result.json").read_text())["failures"]
-    played = tussle("run", *command.split())
+    played = tussle("run", *shlex.split(command))
     assert listed[0]["state_hash"] in played.stdout
     assert "branches that fail" in done.stdout
     assert re.search(r" 1 \(0\.\d+–1\)", done.stdout)
