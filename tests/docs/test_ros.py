@@ -51,7 +51,10 @@ def test_what_a_killed_game_leaves_is_removed_by_the_commands_of_the_page(roscor
             [sys.executable, "-m", "tussle.cli", "run", "cars.xml", "--pace", "1", "--no-log"],
             cwd=tmp_path, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
         )  # fmt: skip
-        while not {"/entity2/odom", "/clock"} <= topics():
+        while (
+            not {"/entity2/odom", "/clock"} <= topics()
+            or master.getParam("/test", "/use_sim_time")[2] is not True
+        ):
             assert game.poll() is None
             time.sleep(0.05)
         game.send_signal(signal.SIGKILL)
