@@ -16,7 +16,7 @@ from histories import difference, played_alone
 
 from tussle.errors import TussleError
 
-N_MISSIONS = int(os.environ.get("TUSSLE_FUZZ", "120"))
+N_MISSIONS = int(os.environ.get("TUSSLE_FUZZ", "200"))
 N_FAST = 40  # of these, in the tests that are not slow
 N_CHECKED = 16
 N_SMALL = int(os.environ.get("TUSSLE_FUZZ", "40"))
