@@ -98,7 +98,7 @@ def show_sample(sample: Sample, study: Stress, directory: Path, options: StressO
                 ("failed", f"{n_failed:,} of {n:,} games, {share(sample.value, sample.low, sample.high)}"),
                 ("robustness", quantiles and f"{quantiles} (least, 5 %, median)"),
                 ("study", str(directory)),
-                ("next", "" if n_failed else f"{again(options)} --probability"),
+                ("next", "" if n_failed else f"{shlex.join(command_line())} --probability"),
             ]
         ),
     )
@@ -174,11 +174,6 @@ def show_chances(lost: list[Chance], study: Stress) -> None:
     put(
         f" of {lost[0].n} branches of {FAILURES}/0.xml from each moment, with other luck; in parentheses: 95 % intervals"
     )
-
-
-def again(options: StressOptions) -> str:
-    """The command that was run."""
-    return shlex.join(command_line())
 
 
 def share(value: float, low: float, high: float) -> str:

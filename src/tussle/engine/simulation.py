@@ -265,7 +265,7 @@ class Simulation:
     def write(self, path: str, values: Any) -> None:
         """Set a column by path, with values shaped as from `read`. Rows of dead entities are ignored. A reset discards parameter values."""
         written = access.write(self.state, path, values)
-        for world in self._told_worlds():
+        for world in np.flatnonzero(self.state.running).tolist() if self._is_told else ():
             self._tell(world, ExternalInput(self._step_of(world), COLUMN, path, written[world].tolist()))
 
     def publish(
@@ -302,15 +302,13 @@ class Simulation:
         buffer = message_bus.topic(network, topic or type_.__name__, type_, "publish")
         sent = batch.take(np.flatnonzero(running[chosen]))
         buffer.add(sent)
-        told = self._told_worlds()
-        for number, world in enumerate(sent.world.tolist()):
-            if world in told:
-                self._tell(world, of_message(sent, number, self._step_of(world), network, topic))
+        for number, world in enumerate(sent.world.tolist()) if self._is_told else ():
+            self._tell(world, of_message(sent, number, self._step_of(world), network, topic))
 
-    def _told_worlds(self) -> list[int]:
-        """Worlds whose inputs are told to listeners."""
-        is_told = self.events.inputs and not self.events.is_replaying
-        return np.flatnonzero(self.state.running).tolist() if is_told else []
+    @property
+    def _is_told(self) -> bool:
+        """Whether listeners are told what comes from outside."""
+        return bool(self.events.inputs) and not self.events.is_replaying
 
     def _step_of(self, world: int) -> int:
         return int(self.state.context.clock.step[world])
@@ -350,7 +348,7 @@ class Simulation:
         """
         if given.kind == COLUMN:
             access.write(self.state, given.name, np.array(given.values), world)
-            if world in self._told_worlds():
+            if self._is_told:
                 self._tell(world, replace(given, step=self._step_of(world)))
             return
         type_ = self.state.message_bus.type_of(given.network, given.topic or given.name, given.name)

@@ -70,7 +70,7 @@ def fields_of(type_: type[Message], values: dict[str, Any]) -> dict[str, Any]:
     """The fields of one message as `Simulation.publish` takes them, from the values of its input."""
     kinds = {name: type_.fields.get(name) for name in values}
     return {
-        name: [np.array(value, float)]
+        name: [np.array(value, kind.dtype)]
         if isinstance(kind := kinds[name], Numbers) and kind.ragged
         else [value]
         if isinstance(kind, Handle)

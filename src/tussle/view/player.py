@@ -80,7 +80,8 @@ class Player:
         self.timeline = Timeline(simulation, world, every, 0.5 * limit)
         self.history = History(simulation, world, 0.5 * limit)
         self.injections: list[Injection] = []
-        self._inputs = list(inputs)
+        self._inputs: Sequence[ExternalInput] = ()
+        self._play_inputs(inputs)
         self.events: list[Event] = []
         self.notes: list[str] = []
         self.curves = GameCurves(simulation, world, self.note)
@@ -119,9 +120,6 @@ class Player:
         sim.events.is_replaying = step < self._furthest_step
         self._furthest_step = max(self._furthest_step, step + 1)
         try:
-            for given in self._inputs:
-                if given.step == step:
-                    sim.play_input(given, self.world)
             for sent in self.injections:
                 if sent.step == step:
                     sim.publish(
@@ -202,7 +200,7 @@ class Player:
         self._check(type_, network, topic, fields)
         step = self.step
         if dropped := [given for given in self._inputs if given.step >= step]:
-            self._inputs = [given for given in self._inputs if given.step < step]
+            self._play_inputs([given for given in self._inputs if given.step < step])
             self.note(
                 f"{counted(len(dropped), 'recorded input')} after this moment will not come: the game takes another course"
             )
@@ -215,6 +213,10 @@ class Player:
             self._furthest_step = step
         self.injections.append(Injection(step, type_, network, topic, fields))
 
+    def _play_inputs(self, inputs: Sequence[ExternalInput]) -> None:
+        self._inputs = inputs
+        self.simulation.play_inputs(inputs, self.world)
+
     def _check(self, type_: type[Message], network: str, topic: str, fields: dict[str, Any]) -> None:
         """Publish the message to no world, so that errors are raised now and not in the step."""
         self.simulation.publish(type_, [], network=network, topic=topic)
@@ -226,7 +228,7 @@ class Player:
         for part in (self.timeline, self.history, self.curves):
             part.clear()
         self.injections.clear()
-        self._inputs.clear()
+        self._play_inputs(())
         self.events.clear()
         self.is_broken = False
         self.simulation.reset([self.world], None if seed is None else [seed])

@@ -11,6 +11,7 @@ from tussle.api import EasyAutonomy, Field, Handle, Interaction, Message, Output
 from tussle.errors import ParameterError, RecordError
 from tussle.record import ExternalInput, load_inputs
 from tussle.record.input_table import inputs_of
+from tussle.record.inputs import fields_of
 from tussle.record.schema import INPUTS
 from tussle.stock import SingleIntegrator
 from tussle.view import Live
@@ -145,6 +146,26 @@ def test_each_world_of_a_stack_has_its_own(tmp_path):
             sim.play_inputs(load_inputs(tmp_path / "run", world))
             sim.step(40)
             assert sim.state_hash() == hashes[world]
+
+
+class Numbers(Message):
+    """A stranger's list of whole numbers."""
+
+    of = Field(dtype=int, ragged=True)
+
+
+def test_whole_numbers_in_lists_keep_their_64_bits(tmp_path):
+    wanted = np.array([2**62 + 1, 2**53 + 1, -(2**63)])
+    with Simulation(mission(), 1) as sim, Recorder(sim, tmp_path / "run"):
+        sim.publish(Numbers, of=[wanted])
+        sim.step()
+    (sent,) = load_inputs(tmp_path / "run")
+    (again,) = fields_of(Numbers, sent.values)["of"]
+    assert again.tolist() == wanted.tolist()
+    with Simulation(mission(), 1) as sim, Recorder(sim, tmp_path / "again"):
+        sim.play_inputs([sent])
+        sim.step()
+    assert load_inputs(tmp_path / "again") == (sent,)
 
 
 def test_a_killed_run_keeps_those_that_were_flushed(tmp_path):
