@@ -40,7 +40,9 @@ def playing(path, steps):
 
 def _played(steps, game, robustness):
     falls, levels = records(robustness)
-    return Played(game, Verdict(float(robustness[-1]), falls.tolist(), levels.tolist()), float(steps), 0.0, "")
+    return Played(
+        game, Verdict(float(robustness[-1]), falls.tolist(), levels.tolist()), float(steps), 0.0, ""
+    )
 
 
 def brownian(p):

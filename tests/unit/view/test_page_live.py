@@ -199,7 +199,7 @@ def test_a_page_that_ends_leaves_no_thread_and_no_port():
 @pytest.mark.parametrize("way", ["send_str", "send_bytes"])
 def test_a_browser_that_goes_while_it_is_sent_something_is_no_error_of_the_page(game, monkeypatch, way):
     """As aiohttp says it; which message is under way at that moment is chance."""
-    live, page, client = game
+    live, page, _ = game
     sent = threading.Event()
 
     async def gone(socket, data):
