@@ -227,7 +227,10 @@ class Rows:
             return np.atleast_2d(g.column(name))[place]
 
         given, kept = list(map(column, self.given)), list(map(column, self.kept))
-        arrays = tuple(np.asarray(each, float) for each in given), tuple(np.asarray(each, float) for each in kept)
+        arrays = (
+            tuple(np.asarray(each, float) for each in given),
+            tuple(np.asarray(each, float) for each in kept),
+        )
         if all(each.dtype == float for each in (*given, *kept)):
             g.kept[self] = arrays
         return arrays

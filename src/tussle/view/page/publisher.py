@@ -191,7 +191,9 @@ class FramePublisher:
             while True:
                 await reader.wake.wait()
                 reader.wake.clear()
-                texts: list[str] = []  # sent outside `caught`: that a browser has gone is no failure of the page
+                texts: list[
+                    str
+                ] = []  # sent outside `caught`: that a browser has gone is no failure of the page
                 if time.monotonic() >= reader.status_due:
                     reader.status_due = time.monotonic() + STATUS_PERIOD
                     with self._failures.caught():
