@@ -208,7 +208,6 @@ class Rows:
         rows_per_thread: int = ROWS_PER_THREAD,
     ) -> None:  # fmt: skip
         """Run the laws for all rows of a view, in substeps of dt [s] each; `own` returns the column of a key, (n,)."""
-
         arrays = g.kept.get(self)
         if arrays is None:
             arrays = self._arrays(g, own)
