@@ -207,7 +207,7 @@ def test_a_batch_that_was_killed_as_it_began_goes_on(mission, reference, tmp_pat
         (path / "design.parquet.part").unlink()
     elif "design.parquet" in gone:
         with pytest.raises(
-            BatchError, match="design[.]parquet is not there; the command of the batch writes it again"
+            BatchError, match=r"design[.]parquet is not there; the command of the batch writes it again"
         ):
             load_batch(path)
     play(batch_of(mission), path)
