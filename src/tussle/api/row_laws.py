@@ -221,7 +221,7 @@ class Rows:
 
         def column(number: Number) -> np.ndarray:
             if isinstance(number.key, tuple):
-                return own(*number.key)
+                return np.asarray(own(*number.key))
             name, place = BODY[str(number.key)]
             return np.atleast_2d(g.column(name))[place]
 
