@@ -221,9 +221,9 @@ class Rows:
 
         def column(number: Number) -> np.ndarray:
             if isinstance(number.key, tuple):
-                return np.asarray(own(*number.key))
+                return own(*number.key)
             name, place = BODY[str(number.key)]
-            return np.atleast_2d(g.column(name))[place]
+            return np.asarray(np.atleast_2d(g.column(name))[place])
 
         given, kept = list(map(column, self.given)), list(map(column, self.kept))
         arrays = (
