@@ -7,6 +7,7 @@ import json
 import math
 import time
 from collections import deque
+from collections.abc import Callable
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -191,29 +192,32 @@ class FramePublisher:
             while True:
                 await reader.wake.wait()
                 reader.wake.clear()
-                texts: list[
-                    str
-                ] = []  # sent outside `caught`: that a browser has gone is no failure of the page
                 if time.monotonic() >= reader.status_due:
                     reader.status_due = time.monotonic() + STATUS_PERIOD
-                    with self._failures.caught():
-                        texts.append(json.dumps(self._status(reader)))
-                await _send_all(socket, texts)
+                    await self._send_document(socket, lambda: self._status(reader))
                 while reader.past:
                     await socket.send_bytes(reader.past.popleft())
                 if reader.drawn_sent != self._n_drawn:
                     reader.drawn_sent = self._n_drawn
                     await socket.send_bytes(self._drawn)
                 # Before the frame: the page has the counts of what it shows.
-                with self._failures.caught():
-                    if curves := self._new_curves(reader):
-                        texts.append(json.dumps(curves))
-                await _send_all(socket, texts)
+                await self._send_document(socket, lambda: self._new_curves(reader))
                 if reader.frame_sent != self.n_made:
                     reader.frame_sent = self.n_made
                     await socket.send_bytes(self._frame)
         except (ConnectionError, RuntimeError):  # it has gone; `serve` hears of it too
             return
+
+    async def _send_document(
+        self, socket: WebSocketResponse, make: Callable[[], dict[str, Any] | None]
+    ) -> None:
+        """Make a document and send it. That a browser has gone is no failure of the page; one while it is made is."""
+        text = ""
+        with self._failures.caught():
+            if document := make():
+                text = json.dumps(document)
+        if text:
+            await socket.send_str(text)
 
     def _status(self, reader: Reader) -> dict[str, Any]:
         live, result = self._live, self._live.result()
@@ -329,8 +333,3 @@ class FramePublisher:
         past = [frames[step] for step in sorted(frames)]
         header = {"kind": "past", "epoch": live.epoch, "seconds": seconds}
         reader.past.append(message(header, pack(past[0].step, past, self._step)))
-
-
-async def _send_all(socket: WebSocketResponse, texts: list[str]) -> None:
-    while texts:
-        await socket.send_str(texts.pop(0))
