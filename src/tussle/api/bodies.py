@@ -246,7 +246,9 @@ class Bodies:
     def chained(self, kept: CachedArrays, names: Sequence[str]) -> list[tuple[Any, ...]]:
         """The kernels that put columns by place of the index of `laid_out`, with their arguments, valid until the next `replace`."""
         index, values = kept.columns[0], self._values
-        return [c for k in names for c in putting(k, values(k), index.place, index.columns[k].columns, 0, self.n)]
+        return [
+            c for k in names for c in putting(k, values(k), index.place, index.columns[k].columns, 0, self.n)
+        ]
 
     def has_chained(self, kept: CachedArrays, names: Sequence[str]) -> None:
         """Note that the kernels of an index and of `chained` have run for the current positions."""

@@ -14,6 +14,7 @@ from tussle.numeric.kernel import Kernel, kernel
 from tussle.numeric.neighbors import kernels
 from tussle.numeric.neighbors.index import Blocks, Floats, Index
 
+
 @cache
 def kernel_of_chains() -> Kernel:
     """The kernel (entries, words, cut, walk, places, out) that calls bound kernels, of which the last is a pair loop.
@@ -68,7 +69,9 @@ class Chain:
         self.blocks, self.spans, self._index = blocks, blocks.spans, index
         out = np.empty((n_out, rows[1] - rows[0]))
         room = blocks.spans.shape[1]
-        cut = Bound(kernels.cut_blocks, *index.cutting(rows, blocks), (kernels.GROUP + kernels.SPANS, 0, -1, 0, room))
+        cut = Bound(
+            kernels.cut_blocks, *index.cutting(rows, blocks), (kernels.GROUP + kernels.SPANS, 0, -1, 0, room)
+        )
         last = Bound(walk, *arrays, out, rows[0], (0, 0), 0)
         puts = [Bound(*call) for call in columns]
         self._bound = [Bound(kernels.build, *index.building(*pos)), cut, *puts, last]
@@ -88,5 +91,9 @@ class Chain:
         if not fits:
             return None
         blocks = self.blocks
-        blocks.n_blocks, blocks.most, blocks.built = int(self._cut[RESULTS]), int(self._cut[RESULTS + 2]), self._index.built
+        blocks.n_blocks, blocks.most, blocks.built = (
+            int(self._cut[RESULTS]),
+            int(self._cut[RESULTS + 2]),
+            self._index.built,
+        )
         return out

@@ -151,7 +151,10 @@ class Index:
     def building(self, x: Floats, y: Floats, z: Floats) -> tuple[Any, ...]:
         """Arguments of `kernels.build` for the positions of all places."""
         worlds, work = (self.world_start, self.members), (self._keys, self._scratch)
-        strips, part = (self._strips, self._world_strip), (kernels.KEYS + kernels.SORT + kernels.PLACES, 0, len(self.order))
+        strips, part = (
+            (self._strips, self._world_strip),
+            (kernels.KEYS + kernels.SORT + kernels.PLACES, 0, len(self.order)),
+        )
         return (x, y, z), self.inverse_cell, worlds, work, self._placed, self.points, strips, part
 
     def update(self, first: int, last: int, x: Floats, y: Floats, z: Floats) -> None:
