@@ -292,7 +292,7 @@ class Bodies:
         """A column as `putting` takes it."""
         if name == "level_forward":
             return self.quat  # computed on the way to the places
-        return self.derived(name) if name in DERIVED else getattr(self, name)  # type: ignore[no-any-return]
+        return self.derived(name) if name in DERIVED else getattr(self, name)
 
     def keep_start(self) -> None:
         """Let the current positions decide who is in range of whom until `end_start`."""
