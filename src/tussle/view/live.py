@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from functools import cached_property
 from typing import Any, Self
 
@@ -178,10 +178,19 @@ class Live:
         number = None if seed is None else int(seed)
         self._give(lambda: self._playback.begin_anew(number), may_cut_in=True)
 
-    def publish(self, type_: type[Message], *, network: str = "", topic: str = "", **fields: Any) -> None:
-        """Publish a message to the plugins before the next step and its replays. Errors appear in `notes`."""
+    def publish(
+        self,
+        type_: type[Message],
+        *,
+        network: str = "",
+        topic: str = "",
+        receivers: Iterable[int] = (),
+        **fields: Any,
+    ) -> None:
+        """Publish a message to the plugins before the next step and its replays, as `Simulation.publish`. Errors appear in `notes`."""
         self._check_is_own()
-        self._give(lambda: self._playback.say(type_, network, topic, fields))
+        ids = tuple(map(int, receivers))
+        self._give(lambda: self._playback.say(type_, network, topic, fields, ids))
 
     def publish_click(self, point: Any) -> None:
         """Publish `WorldPointClicked` with a point [m], (3,), on the network that reaches everyone.

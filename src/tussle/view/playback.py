@@ -257,6 +257,8 @@ class PlaybackController:
         self.pace.restart()
         self.speed.restart()
 
-    def say(self, type_: type[Message], network: str, topic: str, fields: dict[str, Any]) -> None:
+    def say(
+        self, type_: type[Message], network: str, topic: str, fields: dict[str, Any], to: tuple[int, ...]
+    ) -> None:
         """Publish a message to the plugins."""
-        self.player.publish(type_, network, topic, fields)
+        self.player.publish(type_, network, topic, fields, to)

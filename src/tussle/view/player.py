@@ -10,6 +10,7 @@ import numpy as np
 
 from tussle.declare.displays import counted
 from tussle.declare.messages import Message, Messages
+from tussle.engine.delivery import check_order
 from tussle.engine.simulation import Simulation
 from tussle.record import Events
 from tussle.view.curves import GameCurves
@@ -33,6 +34,7 @@ class Injection:
         network: Its network; "" is the one that reaches everyone.
         topic: Its topic; "" is the type's name.
         fields: Field -> value.
+        to: Ids of the entities that get it; () is whoever the network reaches.
     """
 
     step: int
@@ -40,6 +42,7 @@ class Injection:
     network: str = ""
     topic: str = ""
     fields: dict[str, Any] = field(default_factory=dict)
+    to: tuple[int, ...] = ()
 
 
 class Player:
@@ -122,9 +125,8 @@ class Player:
         try:
             for sent in self.injections:
                 if sent.step == step:
-                    sim.publish(
-                        sent.type, [self.world], network=sent.network, topic=sent.topic, **sent.fields
-                    )
+                    to = {"network": sent.network, "topic": sent.topic, "receivers": sent.to}
+                    sim.publish(sent.type, [self.world], **to, **sent.fields)
             sim.step()
         except BaseException:
             self.is_broken = True
@@ -187,17 +189,24 @@ class Player:
 
     # -- another course -----------------------------------------------------------------------------------------------------------
 
-    def publish(self, type_: type[Message], network: str, topic: str, fields: dict[str, Any]) -> None:
+    def publish(
+        self,
+        type_: type[Message],
+        network: str,
+        topic: str,
+        fields: dict[str, Any],
+        to: tuple[int, ...] = (),
+    ) -> None:
         """Publish a message to the plugins before the next step.
 
         Raises:
-            ParameterError: The type has no such field.
+            ParameterError: The type has no such field, or an entity cannot get it.
             WiringError: There is no such network, or the topic carries another type.
         """
         if self.is_over:
             self.note(f"{type_.__name__}: the game is over, so the message is dropped")
             return
-        self._check(type_, network, topic, fields)
+        self._check(type_, network, topic, fields, to)
         step = self.step
         if dropped := [given for given in self._inputs if given.step >= step]:
             self._play_inputs([given for given in self._inputs if given.step < step])
@@ -211,16 +220,23 @@ class Player:
             self.injections[:] = [sent for sent in self.injections if sent.step <= step]
             self._forget_events(step)
             self._furthest_step = step
-        self.injections.append(Injection(step, type_, network, topic, fields))
+        self.injections.append(Injection(step, type_, network, topic, fields, to))
 
     def _play_inputs(self, inputs: Sequence[ExternalInput]) -> None:
         self._inputs = inputs
         self.simulation.play_inputs(inputs, self.world)
 
-    def _check(self, type_: type[Message], network: str, topic: str, fields: dict[str, Any]) -> None:
-        """Publish the message to no world, so that errors are raised now and not in the step."""
-        self.simulation.publish(type_, [], network=network, topic=topic)
-        Messages.make(type_, np.zeros(1, np.int64), np.zeros(1, np.int64), fields)
+    def _check(
+        self, type_: type[Message], network: str, topic: str, fields: dict[str, Any], to: tuple[int, ...]
+    ) -> None:
+        """Raise errors of a message now and not in the step."""
+        bus, batch = (
+            self.simulation.state.message_bus,
+            Messages.make(type_, np.array([self.world]), np.zeros(1, np.int64), fields),
+        )
+        check_order(
+            self.simulation.state, bus.topic(network, topic or type_.__name__, type_, "publish"), batch, to
+        )
 
     def reset(self, seed: int | None) -> None:
         """Restart the world, with another seed if one is given."""
