@@ -453,11 +453,14 @@ class Handle(Column):
         max_worlds: Largest stack of worlds that the objects allow; None for no limit.
         ready_timeout: Longest wait for `ready` [s of wall time].
         doc: One-line description.
+        is_text: In a message: the object is a text, which a user can type.
     """
 
-    def __init__(self, max_worlds: int | None = None, ready_timeout: float = 10.0, doc: str = "") -> None:
+    def __init__(
+        self, max_worlds: int | None = None, ready_timeout: float = 10.0, doc: str = "", is_text: bool = False
+    ) -> None:
         super().__init__(doc=doc)
-        self.max_worlds, self.ready_timeout = max_worlds, ready_timeout
+        self.max_worlds, self.ready_timeout, self.is_text = max_worlds, ready_timeout, is_text
 
     @staticmethod
     def most_worlds(plugin: Any) -> int | None:

@@ -16,6 +16,7 @@ from tussle.declare.lists import RaggedColumn
 from tussle.engine.group import Group
 from tussle.engine.simulation import Simulation
 from tussle.engine.table import Stored, Table
+from tussle.view.orders import OrderKind, orders_of
 
 _COMPONENTS = {3: ("x", "y", "z"), 4: ("w", "x", "y", "z")}
 """Names of the components of a vector and of a quaternion."""
@@ -73,6 +74,7 @@ class EntityState:
         plugins: Plugin, such as "MotorSchemas.AvoidEntityMS" -> column -> reading.
         received: Messages that have arrived and are unread, at most 50.
         sent: Its messages that are under way or unread, at most 50.
+        orders: Messages that its plugins take and that can be typed.
     """
 
     t: float
@@ -84,6 +86,7 @@ class EntityState:
     plugins: dict[str, dict[str, Reading]] = field(default_factory=dict)
     received: list[ShownMessage] = field(default_factory=list)
     sent: list[ShownMessage] = field(default_factory=list)
+    orders: list[OrderKind] = field(default_factory=list)
 
 
 def entity_state(
@@ -126,6 +129,7 @@ def entity_state(
             if group.first <= row < group.last:
                 _read_plugins(group, row - group.first, group.table, state.plugins)
                 state.received.extend(_received(group, world, who) if has_messages else ())
+                state.orders.extend(orders_of(group) if has_messages else ())
         elif group.key in parked.tables:
             rows, held = parked.tables[group.key]
             place = np.flatnonzero(rows == row)

@@ -10,12 +10,12 @@ from typing import Any, Self
 
 import numpy as np
 
-from tussle.declare.messages import CustomKeyPress, Message, WorldPointClicked
+from tussle.declare.messages import CustomKeyPress, Message, RemoveEntity, WorldPointClicked
 from tussle.documents import POSITIVE, check_argument
 from tussle.engine.result import WorldResult
 from tussle.engine.simulation import Simulation
 from tussle.engine.step_end import world_result
-from tussle.errors import ParameterError, PluginError
+from tussle.errors import ParameterError, PluginError, nearest_name
 from tussle.pacing import Pace
 from tussle.record.inputs import ExternalInput
 from tussle.view.curves import GameCurves
@@ -23,6 +23,7 @@ from tussle.view.drawn import DrawCollector, Shape
 from tussle.view.entity import EntityState, entity_state
 from tussle.view.frame import Event, Frame, FrameReader
 from tussle.view.latest import LINGER, LatestValue
+from tussle.view.orders import fields_from
 from tussle.view.pacing import checked_warp, faster, slower
 from tussle.view.playback import Order, PlaybackController
 from tussle.view.player import Injection, Player
@@ -191,6 +192,27 @@ class Live:
         self._check_is_own()
         ids = tuple(map(int, receivers))
         self._give(lambda: self._playback.say(type_, network, topic, fields, ids))
+
+    def order(self, receivers: Iterable[int], network: str, topic: str, values: Mapping[str, Any]) -> None:
+        """Publish a message that a user has typed to some entities, see `tussle.view.orders`. Errors of the game appear in `notes`.
+
+        Raises:
+            ParameterError: There is no such topic, or a value does not fit.
+        """
+        topics = self.simulation.state.message_bus.topics
+        buffer = topics.get((network, topic))
+        if buffer is None:
+            names = sorted("/".join(each) for each in topics)
+            raise ParameterError(
+                f"there is no topic {network}/{topic}{nearest_name(f'{network}/{topic}', names)}"
+            )
+        fields = fields_from(buffer.type, values)
+        self.publish(buffer.type, network=network, topic=topic, receivers=receivers, **fields)
+
+    def remove(self, entities: Iterable[int]) -> None:
+        """Remove entities at the end of the next step."""
+        for who in entities:
+            self.publish(RemoveEntity, entity=int(who), why="order")
 
     def publish_click(self, point: Any) -> None:
         """Publish `WorldPointClicked` with a point [m], (3,), on the network that reaches everyone.

@@ -8,6 +8,7 @@ import math
 import time
 from collections import deque
 from collections.abc import Callable
+from dataclasses import asdict
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -286,7 +287,13 @@ class FramePublisher:
         if state is None:
             return None
         quantities = [[name, unit] for name, (_, unit) in numbers_of(state).items()]
-        return {"id": state.id, "sections": entity_sections(state), "quantities": quantities}
+        orders = [asdict(kind) for kind in state.orders]
+        return {
+            "id": state.id,
+            "sections": entity_sections(state),
+            "quantities": quantities,
+            "orders": orders,
+        }
 
     # -- what they send ---------------------------------------------------------------------------------------------------------------
 
