@@ -5,9 +5,9 @@ import pytest
 from served import UNHURRIED, Watched
 
 from tussle import Block, Mission, Recorder, Simulation
-from tussle.api import Autonomy, Output, State, Subscribe
+from tussle.api import Autonomy, Output, Publish, State, Subscribe
 from tussle.declare.columns import EntityRef, Field, Handle
-from tussle.messages import Message
+from tussle.messages import Message, TextMessage
 from tussle.record import load_inputs
 from tussle.stock import GoTo, SingleIntegrator
 from tussle.view import Live
@@ -29,6 +29,7 @@ class Runner(Autonomy):
     """Keeps what it is told."""
 
     errands = Subscribe(Errand, from_outside=True)
+    report = Publish(TextMessage)
     told = State("items left right times hurry partner length", dtype=float)
     velocity = Output("velocity_x velocity_y velocity_z", unit="m/s")
 
@@ -46,6 +47,7 @@ class Runner(Autonomy):
                 len(heard.note[k] or ""),
             )
             self.told[:, row] = numbers
+        self.report.publish(np.arange(g.n), text=[f"{n:g} places" for n in self.told[0]], to=0)
 
 
 def mission():
@@ -155,6 +157,27 @@ def test_orders_are_carried_out_and_belong_to_the_game(game):
         again.play_inputs(load_inputs(recorder.directory))
         again.step(10)
         assert again.state_hash() == there
+
+
+def test_the_messages_of_the_game_are_shown_while_they_are_asked_for(game):
+    live, watched, _ = game
+    tab = watched.tab
+    assert not live.simulation.events.taps
+    watched.press("f")
+    watched.wait("!document.querySelector('#silence').hidden")
+    watched.until(lambda: live.simulation.events.taps)
+    runners = int((live.frame().block == 1).sum())
+    live.step(15)
+    assert live.settle()
+    watched.wait(f"document.querySelector('#feed li')?.innerText.includes('{10 * runners}/s')")
+    assert "5: text 0 places" in tab.locator("#feed li p").inner_text()
+    assert "GlobalNetwork/TextMessage" in tab.locator("#feed li b").inner_text()
+    tab.locator("#topics").fill("waypoint")
+    watched.wait("document.querySelectorAll('#feed li').length === 0")
+    watched.press("q")
+    assert tab.locator("#feed").is_hidden()
+    watched.until(lambda: not live.simulation.events.taps)
+    watched.press("q")
 
 
 @pytest.mark.parametrize(

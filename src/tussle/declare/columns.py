@@ -497,12 +497,22 @@ class Children(Column):
 
 
 class Field(Numbers):
-    """A field of a message type; with `ragged` a list of items, (k, m) or (m,) per message."""
+    """A field of a message type; with `ragged` a list of items, (k, m) or (m,) per message.
+
+    `example` has the values with which a form for the message begins; by default zeros.
+    """
 
     def __init__(
-        self, fields: str = "", unit: str = "", dtype: type = float, ragged: bool = False, doc: str = ""
+        self,
+        fields: str = "",
+        unit: str = "",
+        dtype: type = float,
+        ragged: bool = False,
+        doc: str = "",
+        example: tuple[float, ...] = (),
     ) -> None:
         super().__init__(fields, unit, dtype, doc, ragged)
+        self.example = example
         self.default = 0
 
 

@@ -348,6 +348,7 @@ class WaypointList(Message):
         unit="m m m rad rad rad m rad",
         ragged=True,
         doc="Positions and attitudes in the world frame, and tolerances.",
+        example=(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 10.0, 0.5),
     )
     mode = Field(dtype=int, doc="Index into WAYPOINT_MODES.")
 

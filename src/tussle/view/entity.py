@@ -13,6 +13,7 @@ from tussle.declare.columns import Column, Numbers, Param, Subscribe
 from tussle.declare.comms import EVERYONE, SAME_ENTITY
 from tussle.declare.comms.topic import Delivery, TopicBuffer
 from tussle.declare.lists import RaggedColumn
+from tussle.declare.messages import Messages
 from tussle.engine.group import Group
 from tussle.engine.simulation import Simulation
 from tussle.engine.table import Stored, Table
@@ -182,7 +183,7 @@ def _received(group: Group, world: int, who: int) -> list[ShownMessage]:
             if isinstance(column, Subscribe):
                 inbox = binding.plugin.__dict__[name]
                 for delivery in inbox.deliveries:
-                    messages += _messages(inbox.topic, delivery, _for_whom(delivery, world, who))
+                    messages += shown_messages(inbox.topic, delivery.batch, _for_whom(delivery, world, who))
     return messages[-MAX_MESSAGES:]
 
 
@@ -202,7 +203,7 @@ def _sent(simulation: Simulation, world: int, who: int) -> list[ShownMessage]:
     for topic in simulation.state.message_bus.topics.values():
         for delivery in _under_way(topic):
             mine = (delivery.batch.world == world) & (delivery.batch.sender == who)
-            messages += _messages(topic, delivery, np.flatnonzero(mine))
+            messages += shown_messages(topic, delivery.batch, np.flatnonzero(mine))
     return messages[-MAX_MESSAGES:]
 
 
@@ -214,8 +215,8 @@ def _under_way(topic: TopicBuffer) -> Iterator[Delivery]:
     yield from known.values()
 
 
-def _messages(topic: TopicBuffer, delivery: Delivery, numbers: np.ndarray) -> list[ShownMessage]:
-    batch = delivery.batch
+def shown_messages(topic: TopicBuffer, batch: Messages, numbers: np.ndarray) -> list[ShownMessage]:
+    """Some messages of a batch, (m,) their numbers, of more than 50 the last."""
     messages = []
     for i in numbers[-MAX_MESSAGES:]:
         fields: dict[str, Any] = {}

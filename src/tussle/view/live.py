@@ -21,6 +21,7 @@ from tussle.record.inputs import ExternalInput
 from tussle.view.curves import GameCurves
 from tussle.view.drawn import DrawCollector, Shape
 from tussle.view.entity import EntityState, entity_state
+from tussle.view.feed import MessageFeed, TopicTraffic
 from tussle.view.frame import Event, Frame, FrameReader
 from tussle.view.latest import LINGER, LatestValue
 from tussle.view.orders import fields_from
@@ -103,6 +104,8 @@ class Live:
         )
         self._shapes: LatestValue[tuple[Shape, ...]] = LatestValue(self._collector.shapes, FRAME_PERIOD, ring)
         self._result: LatestValue[WorldResult | None] = LatestValue(self._make_result, RESULT_PERIOD, ring)
+        self._feed = MessageFeed(simulation, world)
+        self._messages: LatestValue[list[TopicTraffic]] = LatestValue(self._feed.read, STATE_PERIOD, ring)
         self._entities: dict[int, LatestValue[EntityState | None]] = {}
         self._renew(True)
         self._thread: threading.Thread | None = None
@@ -256,6 +259,7 @@ class Live:
             if self._thread.is_alive():
                 return  # the last step takes that long
         self._collector.close()
+        self._feed.close()
         self._player.close()
 
     def settle(self, timeout: float = 60.0) -> bool:
@@ -388,6 +392,10 @@ class Live:
         """Shapes drawn in the last step, and earlier ones that last. Collected only while requested."""
         return self._taken(self._shapes) or ()
 
+    def messages(self) -> list[TopicTraffic]:
+        """What plugins publish, by topic. Listened to only while requested: nothing at the first request."""
+        return self._taken(self._messages) or []
+
     def result(self) -> WorldResult | None:
         """The provisional result, without state hash until the game ends; None at the first request."""
         return self._taken(self._result)  # type: ignore[no-any-return]
@@ -415,6 +423,7 @@ class Live:
             self._frame,
             self._result,
             self._shapes,
+            self._messages,
             *list(self._entities.values()),
         ]
         for latest in values:
@@ -426,6 +435,10 @@ class Live:
             self._collector.open()
         else:
             self._collector.close()
+        if self._messages.idle_for < FORGET_TIME:
+            self._feed.open()
+        else:
+            self._feed.close()
         for who, latest in list(self._entities.items()):
             if latest.idle_for > FORGET_TIME:
                 self._entities.pop(who, None)

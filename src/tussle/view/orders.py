@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import math
+import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -32,6 +32,7 @@ class OrderField:
         units: SI unit of each component, or the only one.
         is_list: It is a list of such values.
         doc: Its description.
+        example: Values of an item with which a form begins.
     """
 
     name: str
@@ -40,6 +41,7 @@ class OrderField:
     units: tuple[str, ...]
     is_list: bool
     doc: str
+    example: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -90,7 +92,15 @@ def field_of(name: str, column: Column) -> OrderField | None:
     assert isinstance(column, Numbers)
     kinds = {bool: FLAG, int: WHOLE}
     kind = ENTITY if isinstance(column, EntityRef) else kinds.get(column.dtype, NUMBER)
-    return OrderField(name, kind, tuple(column.fields), tuple(column.units), column.ragged, column.doc)
+    return OrderField(
+        name,
+        kind,
+        tuple(column.fields),
+        tuple(column.units),
+        column.ragged,
+        column.doc,
+        getattr(column, "example", ()),
+    )
 
 
 def fields_from(type_: type[Message], values: Mapping[str, Any]) -> dict[str, Any]:
@@ -137,13 +147,12 @@ def _numbers(where: str, field: OrderField, item: Any) -> list[Any]:
     kinds: tuple[type, ...] = (
         (bool,) if field.kind == FLAG else (int,) if field.kind in (WHOLE, ENTITY) else (int, float)
     )
+    most = 2**63 - 1 if kinds == (int,) else sys.float_info.max
     is_right = isinstance(numbers, Sequence) and not isinstance(numbers, str) and len(numbers) == (n or 1)
     if is_right:
         for number in numbers:
             is_right &= isinstance(number, kinds) and isinstance(number, bool) == (field.kind == FLAG)
-            is_right = is_right and (
-                abs(number) < 2**63 if int in kinds and float not in kinds else math.isfinite(number)
-            )
+            is_right = is_right and abs(number) <= most
     if not is_right:
         what = {FLAG: "true or false", WHOLE: "a whole number", ENTITY: "the id of an entity"}.get(
             field.kind, "a number"

@@ -27,7 +27,7 @@ from tussle.view.page.document import event_rows
 from tussle.view.page.drawing import drawing_message
 from tussle.view.page.facts import mission_facts
 from tussle.view.page.failures import Failures
-from tussle.view.page.formatting import entity_sections, result_rows
+from tussle.view.page.formatting import entity_sections, feed_rows, result_rows
 from tussle.view.page.packing import message
 from tussle.view.series import OF_TEAMS, Changes, CurveName, StepSeries
 
@@ -58,12 +58,14 @@ class Reader:
     Attributes:
         socket: Its websocket.
         chosen: Id of the entity whose state it reads; 0 for nobody.
+        has_feed: It reads the messages of the game.
         wake: There is something to be sent.
     """
 
     def __init__(self, socket: WebSocketResponse) -> None:
         self.socket = socket
         self.chosen = 0
+        self.has_feed = False
         self.wake = asyncio.Event()
         self.wake.set()
         self.frame_sent = self.drawn_sent = 0
@@ -80,6 +82,10 @@ class Reader:
     def choose(self, id: int) -> None:  # noqa: A002 - as the page calls it
         """Select the entity whose state is sent; 0 selects none."""
         self.chosen = id
+
+    def listen(self, is_on: bool) -> None:
+        """Send the messages of the game, or no more."""
+        self.has_feed = is_on
 
 
 class FramePublisher:
@@ -234,6 +240,7 @@ class FramePublisher:
             "notes": [*live.notes, *self._drawing_notes, *self._failures.texts], "error": None if error is None else str(error),
             "metrics": [] if result is None else result_rows(result, live.teams), "events": self._new_events(reader),
             "entity": self._entity(reader), "refusal": refusal, "steers": self._may_steer(reader),
+            "feed": feed_rows(live.messages()) if reader.has_feed else None,
         }  # fmt: skip
 
     def _new_events(self, reader: Reader) -> dict[str, Any]:
@@ -304,6 +311,7 @@ class FramePublisher:
         """Execute the command of a browser; ignore invalid ones."""
         commands = self._commands | {
             "choose": Command(reader.choose, {"id": ID}, steers=False),
+            "listen": Command(reader.listen, {"is_on": bool}, steers=False),
             "want": Command(lambda wanted: self._want(reader, wanted), {"wanted": WANTED}, steers=False),
             "history": Command(
                 lambda seconds: self._look_back(reader, seconds), {"seconds": Real(0.0, 1e9)}, steers=False

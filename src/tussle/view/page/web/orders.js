@@ -90,15 +90,15 @@ export class OrderForm {
   }
 
   /** A picked point at the height of the chosen entity, since most orders are for what flies. @param {HTMLElement} box @param {number[]} pos @param {OrderField} field */
-  takePlace(box, [x, y], { parts, is_list: isList }) {
+  takePlace(box, [x, y], { parts, is_list: isList, example }) {
     const { layer, chosen } = this.player;
     const slot = layer.slotOf(chosen);
     const z = slot < 0 ? 0 : layer.placeIn(slot)[2];
     const numbers = [x, y, z].map((value) => String(Number(value.toFixed(1))));
     if (isList) {
       const area = box.querySelector('textarea');
-      const zeros = parts.slice(3).map(() => '0');
-      area.value = [...area.value.split('\n').filter((line) => line.trim()), [...numbers, ...zeros].join(' ')].join('\n');
+      const rest = parts.slice(3).map((_, i) => example[i + 3] ?? 0);
+      area.value = [...area.value.split('\n').filter((line) => line.trim()), [...numbers, ...rest].join(' ')].join('\n');
     } else {
       box.querySelectorAll('input').forEach((input, i) => { input.value = numbers[i] ?? input.value; });
     }

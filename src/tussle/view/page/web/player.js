@@ -11,6 +11,7 @@ import { TRAIL_LENGTHS, TRAIL_OF_CHOSEN } from './trails.js';
 import { EventLine } from './events.js';
 import { LiveClock, RecordedClock } from './timeline.js';
 import { Panels } from './panels.js';
+import { MessagePanel } from './feed.js';
 import { OrderForm } from './orders.js';
 import { QuantityPanel } from './quantities.js';
 import { Steering } from './steering.js';
@@ -81,6 +82,7 @@ export class Player {
     this.events = new EventLine(layer, this.clock, (event) => this.jump(event));
     this.panels = new Panels(page, layer, this.hidden, () => this.look());
     this.orders = new OrderForm(this);
+    this.feed = new MessagePanel(this);
     this.quantities = new QuantityPanel(this);
     this.steering = new Steering(this.canvas, this);
     drawn.labels = layer.mostAtOnce <= FEW.labels;
@@ -237,6 +239,7 @@ export class Player {
     this.panels.showTeams(clock.t);
     this.panels.showChosen(this.chosen, this.camera.mode, clock.t);
     this.orders.show();
+    this.feed.show();
     this.quantities.show(clock.t);
     this.events.update(clock.t);
     clock.show(clock.t, clock.isPlaying, clock.speed);
