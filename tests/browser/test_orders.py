@@ -119,6 +119,15 @@ def test_orders_are_carried_out_and_belong_to_the_game(game):
     assert (goals == goals[0]).all()
     assert goals[0, 0] != 200
 
+    # A parameter, for one.
+    tab.locator("#receivers").select_option("one")
+    tab.locator("#order").select_option(label="GoTo.speed")
+    tab.get_by_label("value", exact=True).fill("3.5")
+    watched.button("Send")
+    watched.until(lambda: len(live.injections) == 3 and live.settle())
+    step(live, 1)
+    assert column(live, "drone.GoTo.speed").tolist() == [3.5, 15, 15]
+
     # A stranger's message, of all kinds of fields; what is no number is not sent.
     choose(watched, 4)
     tab.locator("#receivers").select_option("one")
@@ -137,25 +146,25 @@ def test_orders_are_carried_out_and_belong_to_the_game(game):
     tab.mouse.click(500, 330)
     watched.wait("document.querySelector('#orders textarea').value.split('\\n').length === 3")
     watched.button("Send")
-    watched.until(lambda: len(live.injections) == 3 and live.settle())
+    watched.until(lambda: len(live.injections) == 4 and live.settle())
     step(live, 2)
     assert column(live, "runner.Runner.told").tolist() == [[3, 1.5, -2, 3, 1, 5, 5], [0] * 7]
 
     tab.locator("#order").select_option("remove")
     watched.button("Send")
-    watched.until(lambda: len(live.injections) == 4 and live.settle())
+    watched.until(lambda: len(live.injections) == 5 and live.settle())
     step(live, 2)
     assert 4 not in live.frame().id
     watched.wait("document.querySelector('#orders').hidden")
 
     there = live.simulation.state_hash()
     live.seek(0.1)
-    step(live, 9)
+    step(live, 10)
     assert live.simulation.state_hash() == there
     recorder.flush()
     with Simulation(mission(), 3) as again:
         again.play_inputs(load_inputs(recorder.directory))
-        again.step(10)
+        again.step(11)
         assert again.state_hash() == there
 
 

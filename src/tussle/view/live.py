@@ -27,7 +27,7 @@ from tussle.view.latest import LINGER, LatestValue
 from tussle.view.orders import fields_from
 from tussle.view.pacing import checked_warp, faster, slower
 from tussle.view.playback import Order, PlaybackController
-from tussle.view.player import Injection, Player
+from tussle.view.player import Injection, Player, Setting
 from tussle.view.scenery import Scenery, scenery_of
 from tussle.view.series import CurveName
 from tussle.view.sight import fields_of_view
@@ -212,6 +212,18 @@ class Live:
         fields = fields_from(buffer.type, values)
         self.publish(buffer.type, network=network, topic=topic, receivers=receivers, **fields)
 
+    def set_parameter(self, entities: Iterable[int], path: str, value: Any) -> None:
+        """Set a parameter of some entities before the next step, in SI units. Errors appear in `notes`.
+
+        Args:
+            entities: Their ids.
+            path: Plugin and parameter, "GoTo.speed".
+            value: The value, or those of its components.
+        """
+        self._check_is_own()
+        ids = tuple(map(int, entities))
+        self._give(lambda: self._playback.set_parameter(path, value, ids))
+
     def remove(self, entities: Iterable[int]) -> None:
         """Remove entities at the end of the next step."""
         for who in entities:
@@ -356,8 +368,8 @@ class Live:
         return list(self._player.events)
 
     @property
-    def injections(self) -> list[Injection]:
-        """Messages to the plugins from outside."""
+    def injections(self) -> list[Injection | Setting]:
+        """Messages to the plugins, and parameters that were set, from outside."""
         return list(self._player.injections)
 
     @property

@@ -1,4 +1,4 @@
-"""Orders: messages that plugins of an entity take, typed by a user."""
+"""Orders: messages that plugins of an entity take, and parameters of theirs that are set, typed by a user."""
 
 from __future__ import annotations
 
@@ -9,10 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from tussle.declare.columns import Column, EntityRef, Handle, Numbers, Subscribe
+from tussle.declare.columns import Column, EntityRef, Handle, Numbers, Param, Subscribe
 from tussle.declare.messages import Message
-from tussle.engine.group import Group
+from tussle.engine.group import Binding, Group
+from tussle.engine.simulation import Simulation
 from tussle.errors import ParameterError, listed, nearest_name
+from tussle.record.inputs import COLUMN, ExternalInput
 
 MAX_ITEMS = 1000
 """Items of a list in an order."""
@@ -46,15 +48,15 @@ class OrderField:
 
 @dataclass(frozen=True)
 class OrderKind:
-    """Messages of a topic to which plugins of an entity subscribe.
+    """Messages of a topic to which plugins of an entity subscribe; or a parameter, which has no network.
 
     Attributes:
         network: Network of the topic.
-        topic: Its name.
-        message: Name of the message's type.
+        topic: Its name; or plugin and parameter, "GoTo.speed".
+        message: Name of the message's type; of a parameter "".
         plugins: Plugins that subscribe.
         doc: What the message is.
-        fields: Its fields.
+        fields: Its fields; of a parameter one, "value".
     """
 
     network: str
@@ -75,13 +77,65 @@ def orders_of(group: Group) -> list[OrderKind]:
                 heard.setdefault((topic.network, topic.name), (topic.type, []))[1].append(
                     ".".join(binding.path)
                 )
-    found = []
+    found: list[OrderKind] = []
     for (network, topic), (type_, plugins) in heard.items():
         fields = [field_of(name, column) for name, column in type_.fields.items()]
         if all(fields):
             doc = (type_.__doc__ or "").strip().partition("\n")[0]
             typed = tuple(each for each in fields if each is not None)
             found.append(OrderKind(network, topic, type_.__name__, tuple(dict.fromkeys(plugins)), doc, typed))
+    return found + [
+        OrderKind("", ".".join((*binding.path, name)), "", (".".join(binding.path),), column.doc, (field,))
+        for binding in group.walk()
+        for name, column in parameters_of(binding).items()
+        if (field := field_of("value", column)) is not None
+    ]
+
+
+def parameters_of(binding: Binding) -> dict[str, Param]:
+    """The parameters of a plugin that can be set in a game: those that have a number for each entity."""
+    params = type(binding.spec).params()
+    return {name: c for name, c in params.items() if name in binding.params and not (c.ragged or c.choices)}
+
+
+def setting_inputs(
+    simulation: Simulation, world: int, path: str, value: Any, ids: Sequence[int]
+) -> list[ExternalInput]:
+    """The inputs that set a parameter of some entities, one for each of their blocks.
+
+    Args:
+        simulation: The simulation.
+        world: Number of the world.
+        path: Plugin and parameter, "GoTo.speed".
+        value: The value, or those of its components.
+        ids: Ids of the entities.
+
+    Raises:
+        ParameterError: An entity does not exist or has no such parameter, or the value is not allowed.
+    """
+    state = simulation.state
+    bodies, names = state.population.bodies, state.context.block_names
+    rows = bodies.rows_of(np.full(len(ids), world), np.array(ids, np.int64))
+    if (rows < 0).any():
+        raise ParameterError(f"{path}: world {world} has no entity {ids[int(np.argmin(rows))]} now")
+    found = []
+    for block in dict.fromkeys(bodies.block[rows].tolist()):
+        mine = rows[bodies.block[rows] == block]
+        group = next(g for g in state.population.groups if g.first <= mine[0] < g.last)
+        known = {".".join((*b.path, k)): c for b in group.walk() for k, c in parameters_of(b).items()}
+        if path not in known:
+            raise ParameterError(
+                f"{names[block]} has no parameter {path!r} that can be set{nearest_name(path, known)}; {listed(known)}"
+            )
+        column = known[path]
+        field = field_of("value", column)
+        assert field is not None
+        new = _read(f"{names[block]}.{path}", field, value)
+        column.convert(new.tolist(), names[block])
+        values = simulation.read(f"{names[block]}.{path}")[0][world]
+        values[bodies.block_index[mine]] = new
+        step = int(state.context.clock.step[world])
+        found.append(ExternalInput(step, COLUMN, f"{names[block]}.{path}", values.tolist()))
     return found
 
 

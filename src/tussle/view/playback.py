@@ -262,3 +262,7 @@ class PlaybackController:
     ) -> None:
         """Publish a message to the plugins."""
         self.player.publish(type_, network, topic, fields, to)
+
+    def set_parameter(self, path: str, value: Any, to: tuple[int, ...]) -> None:
+        """Set a parameter of some entities."""
+        self.player.set_parameter(path, value, to)

@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
-from tussle import Block, Mission, Simulation
+from tussle import Block, Mission, Recorder, Simulation
 from tussle.declare.columns import EntityRef, Field, Handle
 from tussle.errors import ParameterError
 from tussle.messages import Message, RoadGraph, TextMessage, WaypointList
+from tussle.record import load_inputs
 from tussle.stock import GoTo, MotorSchemas, MoveToGoalMS, SingleIntegrator, Still, WaypointDispatcher
 from tussle.view import Live
 from tussle.view.entity import entity_state
@@ -89,10 +90,75 @@ def test_stock_autonomies_take_orders():
             entity_state(simulation, 0, who).block: entity_state(simulation, 0, who).orders
             for who in (1, 2, 3)
         }
-        assert {name: [each.message for each in some] for name, some in orders.items()} == {
+        assert {name: [each.message for each in some if each.network] for name, some in orders.items()} == {
             "one": ["Waypoint"], "list": ["WaypointList", "Waypoint"], "schemas": ["TextMessage", "Waypoint"],
         }  # fmt: skip
         assert [f.name for f in orders["list"][0].fields] == list(WaypointList.fields)
+
+
+def fleet(n=3):
+    return Mission(
+        name="fleet", end=60.0, dt=0.1,
+        blocks=[
+            Block(
+                name=name, count=n, autonomy=GoTo(waypoints=[(500, 0, 0)], speed=10.0), motion=SingleIntegrator(max_speed=50.0),
+                position=(0, y, 0), variance=(4, 4, 0),
+            )
+            for name, y in (("a", 0), ("b", 100))
+        ],
+    )  # fmt: skip
+
+
+def test_a_parameter_is_set_for_some_entities_and_that_is_part_of_the_game(tmp_path):
+    with (
+        Simulation(fleet(), [1, 2]) as simulation, Recorder(simulation, tmp_path / "run") as recorder,
+        Live(simulation, threaded=False, is_paused=True) as live,
+    ):  # fmt: skip
+        live.step(5)
+        live.set_parameter([2, 4], "GoTo.speed", 30)
+        live.step(1)
+        assert not live.notes
+        assert simulation.read("a.GoTo.speed")[0].tolist() == [[10, 30, 10], [10, 10, 10]]
+        assert simulation.read("b.GoTo.speed")[0].tolist() == [[30, 10, 10], [10, 10, 10]]
+        live.step(20)
+        there = simulation.state_hash()
+        live.seek(0.3)
+        live.step(23)
+        assert simulation.state_hash() == there
+        recorder.flush()
+        inputs = load_inputs(tmp_path / "run")
+    assert [(each.step, each.name) for each in inputs] == [(5, "a.GoTo.speed"), (5, "b.GoTo.speed")]
+    with Simulation(fleet(), 1) as again:
+        again.play_inputs(inputs)
+        again.step(26)
+        assert again.state_hash() == there
+
+
+@pytest.mark.parametrize(
+    ("ids", "path", "value", "note"),
+    [
+        ([1, 99], "GoTo.speed", 3, "GoTo.speed: world 0 has no entity 99 now"),
+        (
+            [1],
+            "GoTo.speeed",
+            3,
+            "a has no parameter 'GoTo.speeed' that can be set (did you mean 'GoTo.speed'?)",
+        ),
+        ([1], "GoTo.waypoints", [1, 2, 3], "a has no parameter 'GoTo.waypoints' that can be set"),
+        ([1], "GoTo.speed", -3, "a: GoTo.speed = -3.0 is not allowed; it takes a finite number"),
+        ([1], "GoTo.speed", "fast", "a.GoTo.speed: it takes a number"),
+        ([1], "GoTo.tolerance_in_2d", 1, "a.GoTo.tolerance_in_2d: it takes true or false"),
+        ([1], "GoTo.current", 1, "a has no parameter 'GoTo.current' that can be set"),
+    ],
+)
+def test_a_parameter_that_cannot_be_set_is_told_and_changes_nothing(ids, path, value, note):
+    with Simulation(fleet(), 1) as simulation, Live(simulation, threaded=False, is_paused=True) as live:
+        live.step(2)
+        before = simulation.state_hash()
+        live.set_parameter(ids, path, value)
+        assert len(live.notes) == 1
+        assert live.notes[0].startswith(note)
+        assert (live.injections, simulation.state_hash()) == ([], before)
 
 
 def test_a_list_of_waypoints_is_followed_by_those_who_got_it():

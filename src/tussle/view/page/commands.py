@@ -96,6 +96,7 @@ def game_commands(live: Live) -> dict[str, Command]:
         "point": Command(point, {"pos": POINT}),
         "key": Command(live.publish_key, {"key": KEY}),
         "order": Command(live.order, {"receivers": IDS, "network": str, "topic": str, "values": TYPED}),
+        "set": Command(live.set_parameter, {"entities": IDS, "path": str, "value": TYPED.rule}),
         "remove": Command(live.remove, {"entities": IDS}),
     }
 

@@ -37,8 +37,15 @@ export class OrderForm {
     if (key === this.offered) return;
     this.offered = key;
     this.kinds = entity.orders;
-    const options = this.kinds.map(({ message, plugins }, i) => new Option(`${message} to ${plugins.join(', ')}`, String(i)));
-    this.select.replaceChildren(...options, new Option('Remove it', REMOVE));
+    const options = this.kinds.map(({ message, topic, plugins }, i) => new Option(message ? `${message} to ${plugins.join(', ')}` : topic, String(i)));
+    const isMessage = (/** @type {unknown} */ _, /** @type {number} */ i) => Boolean(this.kinds[i].message);
+    const groups = { Messages: options.filter(isMessage), Parameters: options.filter((_, i) => !isMessage(_, i)) };
+    this.select.replaceChildren(...Object.entries(groups).filter(([, some]) => some.length).map(([label, some]) => {
+      const made = element('optgroup');
+      made.label = label;
+      made.append(...some);
+      return made;
+    }), new Option('Remove it', REMOVE));
     this.fill();
   }
 
@@ -136,13 +143,15 @@ export class OrderForm {
     try {
       const typed = kind ? kind.fields.map((field) => [field.name, this.typed(field)]).filter(([, value]) => value !== undefined) : [];
       const values = Object.fromEntries(typed);
+      if (kind && !kind.network && values.value === undefined) throw new Error('value: a number');
       for (let i = 0; i < ids.length; i += MAX_RECEIVERS) {
         const some = ids.slice(i, i + MAX_RECEIVERS);
-        if (kind) player.order('order', { receivers: some, network: kind.network, topic: kind.topic, values });
+        if (kind && !kind.network) player.order('set', { entities: some, path: kind.topic, value: values.value });
+        else if (kind) player.order('order', { receivers: some, network: kind.network, topic: kind.topic, values });
         else player.order(REMOVE, { entities: some });
       }
       const whom = ids.length === 1 ? player.layer.who(ids[0]) : `${ids.length} entities`;
-      player.say(`${kind ? kind.message : 'Removal'} for ${whom}: in the next step`);
+      player.say(`${kind ? kind.message || kind.topic : 'Removal'} for ${whom}: in the next step`);
     } catch (error) {
       player.say(error.message);
     }
