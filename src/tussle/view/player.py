@@ -160,8 +160,14 @@ class Player:
             for written in setting_inputs(sim, self.world, given.path, given.value, given.to):
                 sim.play_input(written, self.world)
         else:
-            to = {"network": given.network, "topic": given.topic, "receivers": given.to}
-            sim.publish(given.type, [self.world], **to, **given.fields)
+            sim.publish(
+                given.type,
+                [self.world],
+                network=given.network,
+                topic=given.topic,
+                receivers=given.to,
+                **given.fields,
+            )
 
     def catch_up(self) -> bool:
         """Read the state after steps that others made; return whether they have reset the world since the last call."""
