@@ -25,7 +25,6 @@ def kernel_of_chains() -> Kernel:
     """
     call_bound = caller("i8")
 
-    @kernel("I I Iw Iw (i8 i8 i8) F2w -> b1")
     def run(entries, words, cut, walk, places, out):  # type: ignore[no-untyped-def]
         last = entries.shape[0] - 1
         for k in range(last):
@@ -38,7 +37,7 @@ def kernel_of_chains() -> Kernel:
         call_bound(entries[last], words[last])
         return True
 
-    return run
+    return kernel("I I Iw Iw (i8 i8 i8) F2w -> b1")(run)
 
 
 class Chain:
