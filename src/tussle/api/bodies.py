@@ -11,6 +11,7 @@ import numpy as np
 from tussle.api import kernels
 from tussle.errors import listed, nearest_name
 from tussle.numeric.neighbors.index import Index, Split, padded
+from tussle.numeric.neighbors.kernels import update
 from tussle.world.rays.bodies import BodyTree
 
 FLOATS = {
@@ -257,6 +258,38 @@ class Bodies:
         for name in names:
             column = index.columns[name]
             column.version, column.built = self.version, index.built
+
+    def moved(self, kept: CachedArrays, names: Sequence[str]) -> list[tuple[Any, ...]]:
+        """As `chained`, for rows that move: the kernels take a range of rows; with the place of its first argument before each."""
+        index, _, *pos = kept.columns
+        calls: list[tuple[Any, ...]] = [(0, update, 0, self.n, *pos, index.place, index.points)]
+        for name in names:
+            if name in DERIVED and name != "level_forward":
+                calls.append((1, _DERIVING[name], self.quat, 0, self.n, 0, self.derived(name)))
+            put = putting(name, self._values(name), index.place, index.columns[name].columns, 0, self.n)
+            calls += [(1, *call) for call in put]
+        return calls
+
+    def rows_moved(self, kept: CachedArrays, names: Sequence[str]) -> tuple[int, int] | None:
+        """The only range of rows that has changed since an index and columns by its places were current; None if there is no such one."""
+        columns, version = kept.columns[0].columns, kept.version
+        for name in names:
+            if columns[name].version != version or (
+                name in self._derived and self._derived[name].version != version
+            ):
+                return None
+        ranges = self._since(version)
+        return ranges[0] if len(ranges) == 1 else None
+
+    def has_moved(self, kept: CachedArrays, names: Sequence[str]) -> None:
+        """Note that the kernels of `moved` have run."""
+        version = self.version
+        self._newest, kept.version = kept, version
+        columns = kept.columns[0].columns
+        for name in names:
+            columns[name].version = version
+            if name in self._derived:
+                self._derived[name].version = version
 
     def tree(self, boxes: np.ndarray) -> BodyTree:
         """Tree over the current bodies, for rays; boxes: lengths by block [m], (n_blocks, 3), 0 for spheres."""

@@ -10,12 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from tussle.api.bodies import DERIVED, FLOATS, INTS, Bodies, CachedArrays
+from tussle.api.bodies import DERIVED, FLOATS, IN_PLACE, INTS, Bodies, CachedArrays
 from tussle.api.group import GroupView
 from tussle.declare.columns import Channel, Numbers, Param
 from tussle.errors import DeclarationError, listed, nearest_name
 from tussle.numeric.kernel import Kernel, is_interpreted
-from tussle.numeric.neighbors.chain import Chain
+from tussle.numeric.neighbors.chain import Chain, TurnChain
 from tussle.numeric.neighbors.index import Blocks, Index
 from tussle.numeric.neighbors.law import OTHER, PAIR, Law
 from tussle.numeric.neighbors.walk import make_walk
@@ -234,14 +234,14 @@ class Gathered:
         blocks: Blocks of the rows.
         arrays: Arguments of the kernel.
         uses: Number of steps.
-        chain: All kernels in one call, for positions that have changed.
+        chain: All kernels in one call, for positions that have changed: a `Chain`, or a `TurnChain` where entities move one after another.
     """
 
     laid_out: CachedArrays
     blocks: Blocks
     arrays: tuple[Any, ...]
     uses: int = 0
-    chain: Chain | None = None
+    chain: Any = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -278,7 +278,8 @@ class WalkPlan:
         """Return the contributions of the neighbours of each row."""
         kept = g.kept.get((id(self), id(plugin)))
         if kept is not None and kept.chain is not None and kept.laid_out.version != g._bodies.version:
-            out = self._walk_at_once(g._bodies, kept)
+            chained = self._walk_in_turn if g._bodies.scans else self._walk_at_once
+            out = chained(g._bodies, kept)
             if out is not None:
                 return Contributions(self.names, out)
         blocks, arrays = self.gather(plugin, g)
@@ -308,7 +309,11 @@ class WalkPlan:
             if bodies.scans:  # each row has its whole world as candidates
                 for name in self.moving:
                     bodies.by_place(index, name, split)
-                return blocks, self._with_points(bodies, index, blocks, arrays)
+                arrays = self._with_points(bodies, index, blocks, arrays)
+                kept.uses += 1
+                if kept.uses == MIN_USES and split is None:
+                    kept.chain = self._turns(g, kept, arrays)
+                return blocks, arrays
             if index.blocks(g.first, g.last, share).spans is arrays[0][1]:
                 for name, _ in self.other:
                     bodies.by_place(index, name, split)
@@ -337,15 +342,35 @@ class WalkPlan:
         rows = g.first, g.last
         return Chain(index, tuple(pos), kept.blocks, rows, columns, self.run, kept.arrays, len(self.names))
 
+    def _turns(self, g: GroupView, kept: Gathered, arrays: tuple[Any, ...]) -> TurnChain | None:
+        """As `_chain`, where entities move one after another; None also for columns that are written in place."""
+        run, blocks = self.run_single, kept.blocks
+        if self.lists or not isinstance(run, Kernel) or is_interpreted(run.py_func):
+            return None
+        if set(self.moving) & set(IN_PLACE):
+            return None
+        moved = g._bodies.moved(kept.laid_out, self.moving)
+        return TurnChain(moved, run, arrays, (g.first, g.last), blocks, len(self.names))
+
+    def _walk_in_turn(self, bodies: Bodies, kept: Gathered) -> np.ndarray | None:
+        """The contributions after one range of rows has moved; None if there was more."""
+        chain, laid_out = kept.chain, kept.laid_out
+        rows = bodies.rows_moved(laid_out, self.moving)
+        if rows is None or bodies.range_points(laid_out.columns[0]) is not chain.points:
+            return None
+        out: np.ndarray = chain.run(rows)
+        bodies.has_moved(laid_out, self.moving)
+        return out
+
     def _walk_at_once(self, bodies: Bodies, kept: Gathered) -> np.ndarray | None:
         """The contributions for positions that have changed; None if there is no room for the spans of the blocks."""
         chain = kept.chain
-        if chain is None or chain.spans is not kept.blocks.spans:
+        if chain.spans is not kept.blocks.spans:
             return None
         for name in self.placed:
             if name in DERIVED and name != "level_forward":
                 bodies.derived(name)  # computed in place
-        out = chain.run()
+        out: np.ndarray | None = chain.run()
         bodies.has_chained(kept.laid_out, self.placed)
         return out
 

@@ -9,7 +9,7 @@ from tussle.mission import read_mission
 from tussle.numeric.address import caller
 from tussle.numeric.bound import Bound
 from tussle.numeric.kernel import kernel
-from tussle.numeric.neighbors.chain import Chain
+from tussle.numeric.neighbors.chain import Chain, TurnChain
 from tussle.stock import RandomAttrit, SingleIntegrator
 
 ALWAYS, NEVER = 1, -1
@@ -43,12 +43,29 @@ class Crowd(Autonomy):
         g.bodies.health  # noqa: B018 - as others read it
 
 
-def crowd(**changes):
+class Turning(Autonomy):
+    """Flies as its neighbours do; its law reads computed columns only."""
+
+    sight = Param(40.0, unit="m")
+    velocity = Output("velocity_x velocity_y velocity_z", unit="m/s")
+
+    @neighbors("sight", yaw="mean", north="sum", vy="max", x="sum")
+    @staticmethod
+    def near(other_yaw, other_forward_y, other_vel_y, offset_x, vel_x):
+        return other_yaw, other_forward_y, other_vel_y, offset_x + vel_x
+
+    def step(self, g):
+        found = self.near(g)
+        top = np.where(np.isfinite(found.vy), found.vy, 0.0)
+        self.velocity[:] = -0.5 * g.pos + np.stack([found.yaw + found.north, 0.5 * top, 0.01 * found.x])
+
+
+def crowd(autonomy=Crowd, **changes):
     """Two teams that are far apart at first, and close together soon."""
     blocks = [
         Block(
             name=name, team=team, count=60, placement="uniform", half_width=(150, 150, 20), scatter_first=True,
-            autonomy=Crowd(sight=sight), motion=SingleIntegrator(max_speed=60.0),
+            autonomy=autonomy(sight=sight), motion=SingleIntegrator(max_speed=60.0),
         )
         for name, team, sight in (("a", 1, 40.0), ("b", 2, 55.0))
     ]  # fmt: skip
@@ -59,6 +76,16 @@ MISSIONS = {
     "crowd": crowd(),
     "crowd, no deaths": crowd(interactions=()),
     "predator_prey": read_mission("predator_prey").mission.replace(end=12.0),
+}
+
+
+IN_TURN = {
+    "crowd": crowd(update="sequential", end=3.0),
+    "turning": crowd(Turning, update="random", end=3.0),
+    "predator_prey": read_mission("predator_prey").mission.replace(update="sequential", end=2.0),
+    "predator_prey, random": read_mission("predator_prey").mission.replace(
+        update="random_in_blocks", end=2.0
+    ),
 }
 
 
@@ -77,6 +104,18 @@ def test_the_bits_are_those_of_the_kernels_one_by_one(name, seeds, monkeypatch):
     assert len(calls) > 20
     del calls[:]
     assert chained == hashes(MISSIONS[name], seeds, NEVER, monkeypatch)
+    assert not calls
+
+
+@pytest.mark.parametrize("name", IN_TURN)
+def test_where_entities_move_one_after_another_too(name, monkeypatch):
+    calls, run = [], TurnChain.run
+    monkeypatch.setattr(TurnChain, "run", lambda self, rows: calls.append(rows) or run(self, rows))
+    seeds = [1] if IN_TURN[name].update.startswith("random") else [2, 3]
+    chained = hashes(IN_TURN[name], seeds, ALWAYS, monkeypatch)
+    assert (len(calls) > 200) == (name != "crowd")  # its law reads a column that others write in place
+    del calls[:]
+    assert chained == hashes(IN_TURN[name], seeds, NEVER, monkeypatch)
     assert not calls
 
 

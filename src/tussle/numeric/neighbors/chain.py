@@ -96,3 +96,67 @@ class Chain:
             self._index.built,
         )
         return out
+
+
+@cache
+def kernel_of_turns() -> Kernel:
+    """The kernel (entries, addresses, firsts, rows, words, place, out) that calls bound kernels of rows that have moved, and a pair loop.
+
+    entries, addresses: of the bound kernels and of their words. firsts: where in `words` the rows of each kernel but the last are, which
+    are set to `rows`, first and last. words: all words. place: where in `words` the address of `out` is.
+    """
+    call_bound = caller("i8")
+
+    def run(entries, addresses, firsts, rows, words, place, out):  # type: ignore[no-untyped-def]
+        last = firsts.shape[0]
+        for k in range(last):
+            words[firsts[k]], words[firsts[k] + 1] = rows
+            call_bound(entries[k], addresses[k])
+        words[place] = out.ctypes.data
+        call_bound(entries[last], addresses[last])
+
+    return kernel("I I I (i8 i8) Iw i8 F2w")(run)
+
+
+class TurnChain:
+    """Bound kernels of a pair loop where entities move one after another: only the rows that have moved are put by place.
+
+    Args:
+        moved: Kernels to be called with a range of rows, and their arguments, of which one or two are the range: place of the first one,
+            kernel, arguments.
+        walk: Kernel of the pair loop.
+        arrays: Its arguments before the results.
+        rows: First and last row that asks.
+        blocks: Their blocks.
+        n_out: Number of contributions.
+    """
+
+    def __init__(
+        self,
+        moved: Sequence[tuple[Any, ...]],
+        walk: Kernel,
+        arrays: tuple[Any, ...],
+        rows: tuple[int, int],
+        blocks: Blocks,
+        n_out: int,
+    ) -> None:
+        self.points = arrays[1][2]
+        out = np.empty((n_out, rows[1] - rows[0]))
+        bound = [Bound(*call) for _, *call in moved]
+        last = Bound(walk, *arrays, out, rows[0], (0, blocks.n_blocks), blocks.most)
+        self._bound, self._shape = [*bound, last], out.shape
+        starts = np.cumsum([0, *(len(each.words) for each in self._bound)])
+        words = np.concatenate([each.words for each in self._bound])
+        firsts = np.array(
+            [start + each.at[place] for start, each, (place, *_) in zip(starts, bound, moved, strict=False)]
+        )
+        entries = np.array([each.entry for each in self._bound])
+        self._call = entries, words.ctypes.data + 8 * starts[:-1], firsts
+        self._rest = words, int(starts[-2]) + last.at[4] + DATA
+        self._run = kernel_of_turns()
+
+    def run(self, rows: tuple[int, int]) -> Floats:
+        """Return the contributions, (k, n), after the rows [first, last) have moved."""
+        out = np.empty(self._shape)
+        self._run(*self._call, rows, *self._rest, out)
+        return out
