@@ -62,11 +62,13 @@ class Command:
         do: Does it, called with the fields by name.
         fields: Name -> what it takes; all of them are needed.
         steers: It changes the game or its time, and not only what this browser sees.
+        receivers: Name of the field with the ids of the entities that it is for; operators may give it to those of their team.
     """
 
     do: Callable[..., None]
     fields: Mapping[str, Rule] = field(default_factory=dict)
     steers: bool = True
+    receivers: str = ""
 
 
 def game_commands(live: Live) -> dict[str, Command]:
@@ -95,9 +97,15 @@ def game_commands(live: Live) -> dict[str, Command]:
         "reset": Command(live.reset, {"seed": ID}),
         "point": Command(point, {"pos": POINT}),
         "key": Command(live.publish_key, {"key": KEY}),
-        "order": Command(live.order, {"receivers": IDS, "network": str, "topic": str, "values": TYPED}),
-        "set": Command(live.set_parameter, {"entities": IDS, "path": str, "value": TYPED.rule}),
-        "remove": Command(live.remove, {"entities": IDS}),
+        "order": Command(
+            live.order,
+            {"receivers": IDS, "network": str, "topic": str, "values": TYPED},
+            receivers="receivers",
+        ),
+        "set": Command(
+            live.set_parameter, {"entities": IDS, "path": str, "value": TYPED.rule}, receivers="entities"
+        ),
+        "remove": Command(live.remove, {"entities": IDS}, receivers="entities"),
     }
 
 

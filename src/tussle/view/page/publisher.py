@@ -21,6 +21,7 @@ from tussle.record.run_file import mission_entry
 from tussle.view.curves import numbers_of
 from tussle.view.frame import Event, Frame
 from tussle.view.live import Live
+from tussle.view.page.access import DIRECT, OPERATE, WATCH, PageRole
 from tussle.view.page.chunks import FULL_HEALTH, UNIT, pack, step_of
 from tussle.view.page.commands import ID, MAX_ID, WANTED, Command, game_commands, read_command
 from tussle.view.page.document import event_rows
@@ -57,13 +58,14 @@ class Reader:
 
     Attributes:
         socket: Its websocket.
+        role: What it may do.
         chosen: Id of the entity whose state it reads; 0 for nobody.
         has_feed: It reads the messages of the game.
         wake: There is something to be sent.
     """
 
-    def __init__(self, socket: WebSocketResponse) -> None:
-        self.socket = socket
+    def __init__(self, socket: WebSocketResponse, role: PageRole) -> None:
+        self.socket, self.role = socket, role
         self.chosen = 0
         self.has_feed = False
         self.wake = asyncio.Event()
@@ -172,9 +174,9 @@ class FramePublisher:
 
     # -- one browser ----------------------------------------------------------------------------------------------------------------
 
-    async def serve(self, socket: WebSocketResponse) -> None:
+    async def serve(self, socket: WebSocketResponse, role: PageRole) -> None:
         """Send to a browser and take what it sends, until it goes."""
-        reader = Reader(socket)
+        reader = Reader(socket, role)
         self.readers.append(reader)
         sender = asyncio.create_task(self._send(reader))
         try:
@@ -240,6 +242,7 @@ class FramePublisher:
             "notes": [*live.notes, *self._drawing_notes, *self._failures.texts], "error": None if error is None else str(error),
             "metrics": [] if result is None else result_rows(result, live.teams), "events": self._new_events(reader),
             "entity": self._entity(reader), "refusal": refusal, "steers": self._may_steer(reader),
+            "role": {"kind": reader.role.kind, "team": reader.role.team},
             "feed": feed_rows(live.messages()) if reader.has_feed else None,
         }  # fmt: skip
 
@@ -305,7 +308,32 @@ class FramePublisher:
     # -- what they send ---------------------------------------------------------------------------------------------------------------
 
     def _may_steer(self, reader: Reader) -> bool:
-        return not self._one_steers or self.readers[0] is reader
+        """Whether a browser may do everything: of those of this role, where one steers the first."""
+        steering = [each for each in self.readers if each.role.kind == DIRECT]
+        return reader in (steering[:1] if self._one_steers else steering)
+
+    def _check_role(self, reader: Reader, command: Command, given: dict[str, Any]) -> None:
+        """Refuse a command that a browser may not give.
+
+        Raises:
+            ParameterError: It is for another role, or for an entity of another team.
+        """
+        if not command.steers or self._may_steer(reader):
+            return
+        role = reader.role
+        if role.kind != OPERATE:
+            raise ParameterError(
+                "this address is for watching" if role.kind == WATCH else "another browser steers this game"
+            )
+        if not command.receivers:
+            raise ParameterError(f"this address is for orders to team {role.team}")
+        frame = self._live.frame()
+        team = dict(zip(frame.id.tolist(), frame.team.tolist(), strict=True))
+        for who in given[command.receivers]:
+            if team.get(who) != role.team:
+                raise ParameterError(
+                    f"entity {who} is not of team {role.team}, to which this address gives orders"
+                )
 
     def _take(self, reader: Reader, text: Any) -> None:
         """Execute the command of a browser; ignore invalid ones."""
@@ -323,8 +351,7 @@ class FramePublisher:
                 if read is None:
                     return
                 command = commands[read[0]]
-                if command.steers and not self._may_steer(reader):
-                    raise ParameterError("another browser steers this game")
+                self._check_role(reader, command, read[1])
                 command.do(**read[1])
             except ParameterError as error:
                 self._refuse(reader, str(error))

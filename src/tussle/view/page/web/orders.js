@@ -30,7 +30,7 @@ export class OrderForm {
   show() {
     const { layer, chosen } = this.player;
     const entity = layer instanceof Live && layer.status?.entity;
-    const isThere = Boolean(entity && entity.id === chosen && layer.slotOf(chosen) >= 0);
+    const isThere = Boolean(entity && entity.id === chosen && layer.slotOf(chosen) >= 0 && this.may(chosen));
     this.form.hidden = !isThere;
     if (!isThere) return;
     const key = JSON.stringify(entity.orders);
@@ -47,6 +47,14 @@ export class OrderForm {
       return made;
     }), new Option('Remove it', REMOVE));
     this.fill();
+  }
+
+  /** Whether orders may be given to an entity from this address. @param {number} id */
+  may(id) {
+    const { layer } = this.player;
+    if (!(layer instanceof Live)) return false;
+    const { steers, role } = layer.status;
+    return steers || (role.kind === 'operate' && layer.shown.team[layer.slotOf(id)] === role.team);
   }
 
   /** @returns {OrderKind | undefined} */
