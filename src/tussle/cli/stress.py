@@ -11,14 +11,17 @@ from typing import Any
 import numpy as np
 
 from tussle.batch.statistics import scipy_package
+from tussle.batch.store import reported
 from tussle.cli.batch import command_line
 from tussle.cli.batch_options import StressOptions
 from tussle.cli.interrupt import Interrupt, Interrupted
 from tussle.cli.options import show_notes
 from tussle.cli.progress import ProgressMeter, compiling
 from tussle.cli.tables import fact_list, number_tables, title
-from tussle.cli.terminal import OK, put, say, say_note
+from tussle.cli.terminal import DOES_NOT_HOLD, OK, put, say, say_note
+from tussle.record.run_file import put_whole
 from tussle.stress.chances import Chance
+from tussle.stress.confidence import Assurance, junit_xml
 from tussle.stress.games import Played
 from tussle.stress.study import FAILURES, MAX_FAILURES, Probability, Sample, Stress
 
@@ -82,7 +85,26 @@ def stress(options: StressOptions) -> int:
         show_sample(sample, study, directory, options)
     if lost:
         show_chances(lost, study)
-    return OK
+    if options.holds is None:
+        return OK
+    return judge(found if options.probability else sample, study, directory, options)
+
+
+def judge(found: Sample | Probability, study: Stress, directory: Path, options: StressOptions) -> int:
+    """Say whether the specification holds as it is asked to, write that as JUnit XML, and return the exit code."""
+    asked, assurance = float(options.holds or 0.0), Assurance.of(found)
+    if options.junit is not None:
+        files = [
+            str(directory / FAILURES / f"{i}.xml") for i in range(min(len(found.failures), MAX_FAILURES))
+        ]
+        with reported(options.junit):
+            options.junit.parent.mkdir(parents=True, exist_ok=True)
+            put_whole(
+                options.junit,
+                junit_xml(study.batch.name, str(study.specification), assurance, asked, files),
+            )
+    put("", f" {assurance.sentence(asked)}")
+    return OK if assurance.least > asked else DOES_NOT_HOLD
 
 
 def show_sample(sample: Sample, study: Stress, directory: Path, options: StressOptions) -> None:
