@@ -198,6 +198,10 @@ class StressOptions(PoolOptions):
         bool,
         flag("--why", "Show from which moment on the worst failing game was lost, by branches of it."),
     ] = False
+    shrink: Annotated[
+        bool,
+        flag("--shrink", "Make the worst failing game as small as it can be, as failures/smallest.xml."),
+    ] = False
     particles: Annotated[
         int,
         option("N", "With --probability: games at a time, of each repetition.", min=2, shows_default=True),

@@ -5,6 +5,7 @@ from tussle.stress.confidence import Assurance
 from tussle.stress.games import Played, StressGame
 from tussle.stress.given import GivenGame, given_games
 from tussle.stress.monitor import Monitor, Verdict
+from tussle.stress.shrink import SmallestGame
 from tussle.stress.specification import Specification
 from tussle.stress.splitting import Repetition
 from tussle.stress.study import Probability, Sample, Stress
@@ -18,6 +19,7 @@ __all__ = [
     "Probability",
     "Repetition",
     "Sample",
+    "SmallestGame",
     "Specification",
     "Stress",
     "StressGame",

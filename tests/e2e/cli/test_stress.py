@@ -52,6 +52,14 @@ def test_a_study_that_is_killed_goes_on(process, tussle, folder):
     assert (folder / "other/result.json").read_text() == result
 
 
+def test_the_smallest_failing_game_plays_alone(tussle, folder):
+    done = tussle(*STUDY, "-n", "3", "--spec", "always (distance(left, right) > 7.5 m)", "--shrink")
+    assert "no part of it can be left out" in " ".join(done.stdout.split())
+    small = folder / "out/failures/smallest.xml"
+    assert 'end="6' not in small.read_text()
+    tussle("run", small, "--plugin-path", EXAMPLE / "hover.py")
+
+
 def test_a_check_ends_with_an_exit_code(tussle, folder):
     check = (*STUDY, "-n", "40", "--holds", "0.9", "--junit", "xml/stress.xml")
     done = tussle(*check, "--spec", "always (distance(left, right) > 7 m)", "--out", "bad", code=6)
