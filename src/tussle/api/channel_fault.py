@@ -142,7 +142,7 @@ class ChannelFault(EntityPlugin):
         is_new = ~self.has_past
         self.past[:, is_new] = np.tile(true[:, is_new], (self.delay, 1))
         self.has_past[:] = True
-        late = self.past[-k:].copy()
+        late: np.ndarray = self.past[-k:].copy()
         self.past[k:] = self.past[:-k].copy()
         self.past[:k] = true
         return late

@@ -90,23 +90,23 @@ def _smaller(mission: Mission, verdict: Verdict) -> Iterator[Mission | None]:
     """Yield smaller missions, those that leave out most first; None for one that is invalid."""
     step = verdict.first_below(0.0)
     if step is not None and (end := mission.start + (step + 1) * mission.dt) < mission.end:
-        yield _valid(lambda: mission.replace(end=float(f"{end:.12g}")))
+        yield _valid(mission.replace, end=float(f"{end:.12g}"))
     blocks = list(mission.blocks)
     for i in range(len(blocks)):
-        yield _valid(lambda i=i: mission.replace(blocks=blocks[:i] + blocks[i + 1 :]))
+        yield _valid(mission.replace, blocks=blocks[:i] + blocks[i + 1 :])
     for i, block in enumerate(blocks):
         for count in sorted({1, block.count // 2, block.count - 1} - {0, block.count}):
-            yield _valid(lambda i=i, count=count: _with_block(mission, i, count=count))
+            yield _valid(_with_block, mission, i, count=count)
     for name in ("interactions", "metrics", "networks", "rekeys"):
         for rest in _without_one(getattr(mission, name)):
-            smaller = _valid(lambda name=name, rest=rest: mission.replace(**{name: rest}))
+            smaller = _valid(mission.replace, **{name: rest})
             # A mission adds the networks that it cannot be without.
             if smaller is not None and len(getattr(smaller, name)) == len(rest):
                 yield smaller
     for i, block in enumerate(blocks):
         for name in ("sensor", "controller", "autonomy"):
             for rest in _without_one(getattr(block, name)):
-                yield _valid(lambda i=i, name=name, rest=rest: _with_block(mission, i, **{name: rest}))
+                yield _valid(_with_block, mission, i, **{name: rest})
     yield from _rounded(mission)
 
 
@@ -121,9 +121,9 @@ def _with_block(mission: Mission, i: int, **values: Any) -> Mission:
     return mission.replace(blocks=blocks)
 
 
-def _valid(make: Callable[[], Mission]) -> Mission | None:
+def _valid(make: Callable[..., Mission], *arguments: Any, **values: Any) -> Mission | None:
     try:
-        return make()
+        return make(*arguments, **values)
     except TussleError:
         return None
 
@@ -133,11 +133,7 @@ def _rounded(mission: Mission) -> Iterator[Mission | None]:
     for path, owner in _owners(paths.MissionRoot(mission)):
         for name, old in _values(owner):
             for new in _rounder(old):
-                yield _valid(
-                    lambda path=path, name=name, new=new: paths.with_value(
-                        mission, ".".join((*path, name)), new
-                    )
-                )
+                yield _valid(paths.with_value, mission, ".".join((*path, name)), new)
 
 
 def _owners(owner: Any, path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], Any]]:
