@@ -6,6 +6,7 @@ import inspect
 
 import numpy as np
 import pytest
+from test_radio_network import hears, is_near, n_heard, talks
 
 from tussle import Block, Mission, Simulation
 from tussle.api import Autonomy, Input, MotionModel, Output, Sensor
@@ -15,6 +16,7 @@ from tussle.plugins import stock
 from tussle.stock import (
     GPS,
     ActuatorFault,
+    FailingRadio,
     NoisyState,
     RigidBody6DOF,
     SensorFault,
@@ -189,3 +191,29 @@ def test_what_is_refused():
     pilot, broken = driver(["velocity_x"], 0.0), ActuatorFault(channels="velocity_x")
     with pytest.raises(WiringError, match="no plugin writes channel 'velocity_y' for SingleIntegrator"):
         flight(autonomy=pilot, controller=broken, motion=SingleIntegrator())
+
+
+def radio_game(n, last=10**6, **radio):
+    """Worlds of two entities, of which one sends, at their end."""
+    blocks = [talks("a", 0.0, network="FailingRadio", last=last), hears("b", 50.0, network="FailingRadio")]
+    mission = Mission(blocks=blocks, networks=[FailingRadio(**radio)], end=1.0, dt=0.1)
+    sim = Simulation(mission, seeds=range(1, n + 1))
+    return sim, [each.metrics["FailingRadio"] for each in sim.run()]
+
+
+def test_radios_are_out_in_bursts():
+    """The chance that both of two messages arrive is that of Gilbert's model, for two radios that are out half of the time."""
+    n, both = 800, (0.5 * (0.5 + 0.5 * np.exp(-2.0 * 0.1))) ** 2
+    sim, found = radio_game(n, last=2, failure_rate=1.0, outage=1.0)
+    heard = np.array([each["delivered"] for each in found])
+    assert is_near(heard.sum(), 0.25, 2 * n)
+    assert is_near((heard == 2).sum(), both, n)
+    assert n_heard(sim, "b") == heard.sum()
+    assert (sum(each["lost_outage"] for each in found)) == 2 * n - heard.sum()
+
+
+def test_jamming_silences_a_world_for_some_time():
+    _, (found,) = radio_game(1, failure_rate=0.0, jam_start=0.35, jam_duration=0.4)
+    assert (found["delivered"], found["lost_jammed"]) == (6, 4)
+    assert radio_game(1, failure_rate=0.0)[1][0]["delivered"] == 10
+    assert radio_game(1, failure_rate=0.0, range=49.0)[1][0]["sent"] == 0
