@@ -19,6 +19,7 @@ from tussle.plugins.stock.motion import jsbsim_model
 from tussle.scene import Scene
 from tussle.stock import (
     AircraftPIDController,
+    JSBSimCompiled,
     JSBSimControl,
     JSBSimControlControllerHeadingPID,
     JSBSimModel,
@@ -297,3 +298,22 @@ def test_a_propeller_that_begins_to_turn_does_not_throw_the_aircraft_over(tmp_pa
         sim.step()
         fastest = max(fastest, float(np.abs(body(sim, "omega")).max()))
     assert 0.0 < math.degrees(fastest) < 100.0
+
+
+@pytest.mark.parametrize("model", [JSBSimControl, JSBSimCompiled], ids=lambda model: model.__name__)
+def test_an_aircraft_that_tumbles_from_the_start_is_told_once(model):
+    with Simulation(mission(model(aircraft="c172p"), Stick(), count=2), 1) as simulation:
+        simulation.write("a.omega", [[[0.0, 0.0, 0.0], [40.0, 0.0, 0.0]]])
+        with pytest.warns(
+            RuntimeWarning,
+            match=rf"{model.__name__}: a 2 of world 0 turns at \d,\d+ deg/s at t = 0\.\d+ s: it tumbles",
+        ) as told:
+            simulation.step(20)
+        assert len(told) == 1
+
+
+def test_an_aircraft_that_tumbles_later_is_not():
+    with Simulation(mission(JSBSimCompiled(aircraft="c172p"), Stick()), 1) as simulation:
+        simulation.step(130)
+        simulation.write("a.omega", [[[40.0, 0.0, 0.0]]])
+        simulation.step(3)
