@@ -121,7 +121,7 @@ class RigidBodyModel(MotionModel):
             row = int(fast[0])
             rate, t = math.degrees(np.abs(rates[:, row]).max()), body.context.clock.at(1.0)[body.world[row]]
             warnings.warn(
-                f"{self.instance_name}: {body.who(row)} turns at {rate:,.0f} deg/s at t = {t:g} s: it tumbles; look at its speed, attitude "
+                f"{self.instance_name}: {body.who(row)} turns at {rate:.4g} deg/s at t = {t:g} s: it tumbles; look at its speed, attitude "
                 "and trim at the start, and at its engines",
                 RuntimeWarning,
                 stacklevel=2,
