@@ -14,7 +14,7 @@ from tussle.view.entity import entity_state
 from tussle.view.orders import MAX_ITEMS, MAX_TEXT, field_of, fields_from
 
 
-class Numbers(Message):
+class PlainNumbers(Message):
     """A list of single values."""
 
     plain = Field(dtype=int, ragged=True)
@@ -39,7 +39,7 @@ def test_values_of_all_kinds_are_those_of_the_message():
     found = fields_from(Parcel, given)
     assert found["place"].tolist() == [1, 2.5, -3]
     assert found["rows"][0].tolist() == [[1, 3, 5], [2, 4, 6]]
-    assert fields_from(Numbers, {"plain": [7, 2**62 + 1]})["plain"][0].tolist() == [7, 2**62 + 1]
+    assert fields_from(PlainNumbers, {"plain": [7, 2**62 + 1]})["plain"][0].tolist() == [7, 2**62 + 1]
     assert (int(found["count"]), bool(found["is_urgent"]), int(found["who"]), found["label"]) == (
         -(2**62) - 1, True, 4, ["käse"],
     )  # fmt: skip

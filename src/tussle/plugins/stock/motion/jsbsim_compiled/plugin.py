@@ -281,11 +281,6 @@ class JSBSimCompiled(RigidBodyModel):
             state[SLOTS + len(x) :, rows] = np.concatenate([filters, own])
         super().from_body(body, rows)
 
-    def to_body(self, body: MotionBody) -> None:
-        """Write the states, and warn of aircraft that tumble from the start."""
-        super().to_body(body)
-        self.warn_of_tumbling(body)
-
     @property
     def kernel(self) -> RangeKernel:
         """The kernel that makes steps of all aircraft."""
