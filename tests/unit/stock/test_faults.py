@@ -217,3 +217,17 @@ def test_jamming_silences_a_world_for_some_time():
     assert (found["delivered"], found["lost_jammed"]) == (6, 4)
     assert radio_game(1, failure_rate=0.0)[1][0]["delivered"] == 10
     assert radio_game(1, failure_rate=0.0, range=49.0)[1][0]["sent"] == 0
+
+
+def test_a_radio_does_not_depend_on_who_sends_in_other_worlds():
+    """Worlds of a stack send at different times: what is drawn for a world when only others send would change it."""
+    blocks = [talks("a", 0.0, network="FailingRadio"), hears("b", 50.0, network="FailingRadio")]
+    mission = Mission(blocks=blocks, networks=[FailingRadio(failure_rate=1.0)], end=2.0, dt=0.1)
+    with Simulation(mission, [5]) as alone, Simulation(mission, [5, 6]) as stack:
+        alone.step(2)
+        stack.step(2)
+        for sim in (alone, stack):  # in world 0, the sender is gone for some steps: nobody sends there
+            sim.write("a.health", [[0.0]] if sim is alone else [[0.0], [1.0]])
+        alone.step(5)
+        stack.step(5)
+        assert alone.state_hash() == stack.state_hash(0)

@@ -34,7 +34,11 @@ class FailingRadio(Network):
 
     def transmit(self, w: WorldView, outboxes: Sequence[Messages]) -> Links:
         """Lose the messages from and to radios that are out."""
-        self._advance(w)
+        has_messages = np.zeros(w.n_worlds, bool)
+        for batch in outboxes:
+            has_messages[batch.world] = True
+        # Only there: whether other worlds of the stack have messages changes nothing.
+        self._advance(w, np.flatnonzero(has_messages[w.world]))
         links = Links(w, outboxes, self.range[w.world])
         links.lose(OUTAGE, self.is_out[links.sender[links.message]] | self.is_out[links.receiver])
         since = w.t - self.jam_start + 1e-6 * w.dt
@@ -42,12 +46,13 @@ class FailingRadio(Network):
         links.lose(JAMMED, is_jammed[links.world[links.message]])
         return links
 
-    def _advance(self, w: WorldView) -> None:
-        """Draw which radios are out now, given which were when they were last drawn."""
-        now, rate, back = w.t[w.world], self.failure_rate[w.world], 1.0 / self.outage[w.world]
-        share, is_known = rate / (rate + back), np.isfinite(self.known_at)
-        left = exp(-(rate + back) * (now - np.where(is_known, self.known_at, now)))
-        probability = np.where(is_known, share + (self.is_out - share) * left, share)
-        draw = w.uniform_by("outage", w.world, w.id, np.zeros(w.n, np.int64))
-        self.is_out[:] = draw < probability
-        self.known_at[:] = now
+    def _advance(self, w: WorldView, rows: np.ndarray) -> None:
+        """Draw which radios of some rows, (m,), are out now, given which were when they were last drawn."""
+        world, known_at = w.world[rows], self.known_at[rows]
+        now, rate, back = w.t[world], self.failure_rate[world], 1.0 / self.outage[world]
+        share, is_known = rate / (rate + back), np.isfinite(known_at)
+        left = exp(-(rate + back) * (now - np.where(is_known, known_at, now)))
+        probability = np.where(is_known, share + (self.is_out[rows] - share) * left, share)
+        draw = w.uniform_by("outage", world, w.id[rows], np.zeros(len(rows), np.int64))
+        self.is_out[rows] = draw < probability
+        self.known_at[rows] = now
