@@ -338,7 +338,7 @@ class WalkPlan:
         is_general = self.is_constant and not self.lists and not index.is_fixed
         if not (is_general and isinstance(self.run, Kernel)) or is_interpreted(self.run.py_func):
             return None
-        columns = g._bodies.chained(kept.laid_out, [name for name, _ in self.other])
+        columns = g._bodies.chained(kept.laid_out, self.placed)
         rows = g.first, g.last
         return Chain(index, tuple(pos), kept.blocks, rows, columns, self.run, kept.arrays, len(self.names))
 
