@@ -5,6 +5,7 @@ from tussle.stress.confidence import Assurance
 from tussle.stress.games import Played, StressGame
 from tussle.stress.given import GivenGame, given_games
 from tussle.stress.monitor import Monitor, Verdict
+from tussle.stress.search import Search, Tried
 from tussle.stress.shrink import SmallestGame
 from tussle.stress.specification import Specification
 from tussle.stress.splitting import Repetition
@@ -19,10 +20,12 @@ __all__ = [
     "Probability",
     "Repetition",
     "Sample",
+    "Search",
     "SmallestGame",
     "Specification",
     "Stress",
     "StressGame",
+    "Tried",
     "Verdict",
     "given_games",
 ]
