@@ -52,7 +52,15 @@ def planted(number: int) -> tuple[Mission, str, float]:
         Block(name=name, team=1, position=start, autonomy=Drift(), motion=SingleIntegrator())
         for name, start in STARTS.items()
     ]
-    blocks.append(Block(name="post", team=2, position=tuple(place.tolist()), autonomy=Drift(gust=0.0), motion=SingleIntegrator()))
+    blocks.append(
+        Block(
+            name="post",
+            team=2,
+            position=tuple(place.tolist()),
+            autonomy=Drift(gust=0.0),
+            motion=SingleIntegrator(),
+        )
+    )
     text = f"always (distance(left, post) > {radius}) or always (distance(right, post) > {radius})"
     return Mission(blocks=blocks, end=LENGTH, dt=DT), text, float(np.mean(worst < radius))
 
@@ -70,7 +78,9 @@ def main() -> None:
     parser.add_argument("--repetitions", type=int, default=20)
     parser.add_argument("--samplers", nargs="*", default=["cmaes", "tpe", "random"])
     given = parser.parse_args()
-    print(f"games until the first failure, median of {given.repetitions}; found of {given.repetitions} in {MAX_GAMES:,} games")
+    print(
+        f"games until the first failure, median of {given.repetitions}; found of {given.repetitions} in {MAX_GAMES:,} games"
+    )
     for number in range(10):
         mission, text, share = planted(number)
         row = [f"mission {number}: random games fail with {share:.1e}"]

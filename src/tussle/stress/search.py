@@ -1,21 +1,23 @@
 """Search for values and seeds with which a game fails, and for failures that differ.
 
 CMA-ES (Hansen, arXiv:1604.00772) searches the ranges of the values as a cube. It begins again elsewhere when a round mostly fails, since it
-would find that failure over and over, and when it does not come nearer to one. Each game has a seed of its own, so luck is searched too.
+would find that failure over and over, and when it does not come nearer to one. Luck is searched too: each game has a seed of its own, and
+beside the proposed games of a round as many branches are played, which repeat one of the games that came nearest up to where it did, and then
+have other luck, as in splitting.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
 import numpy as np
 
 from tussle.batch.points import settings_of
 from tussle.batch.search.proposals import Proposer, require_optuna
-from tussle.batch.search.trials import Trial
+from tussle.batch.search.trials import Trial, value_of
 from tussle.batch.variables import Choice, Range, Value, Variable
 from tussle.errors import ParameterError, listed, nearest_name
 from tussle.numeric.rng import stream_key, uniform
@@ -26,6 +28,8 @@ WIDTH = 0.3
 """Standard deviation of a search's first round, as part of each range."""
 MAX_IDLE_ROUNDS = 12
 """Rounds without a game nearer to failure, after which the search begins elsewhere."""
+MAX_BEST = 32
+"""Games that came nearest, of which branches are made."""
 APART = 0.2
 """Failures differ if one value, or the time of failure, differs by more than this part of its range."""
 START = stream_key("stress", "search")
@@ -94,7 +98,12 @@ class Search:
 
     def label(self, game: Tried) -> str:
         """The values of a game on one line."""
-        return ", ".join(f"{name}={value}" for name, value in settings_of(game.values, self.variables).items())
+        return label(settings_of(game.values, self.variables))
+
+
+def label(settings: Values) -> str:
+    """Settings on one line."""
+    return ", ".join(f"{name}={value}" for name, value in settings.items())
 
 
 class Searcher(Protocol):
@@ -136,7 +145,7 @@ class CubeSearcher:
             self._points = [self._cma.ask() for _ in range(n)]
         self._round += 1
         return [
-            {v.name: v.value_at(min(float(u), 1.0)) for v, u in zip(self._variables, point, strict=False)}
+            {v.name: _value(v, float(u)) for v, u in zip(self._variables, point, strict=False)}
             for point in self._points
         ]
 
@@ -242,38 +251,60 @@ def search(
         ParameterError: The mission cannot be played with any values of the first rounds.
     """
     result = Search(variables, [], [])
-    sides = 1 + is_differential
+    sides, has_luck = 1 + is_differential, True
     while len(result.games) < games and len(result.refused) <= games and result.n_failed < failures:
         points, first = by.propose(), len(result.games)
-        playable = []
+        playable: list[int] = []
         for k, point in enumerate(points):
             if error := refusal(settings_of(point, variables)):
                 result.refused.append((point, error))
             elif first + len(playable) < games:
                 playable.append(k)
-        if not playable:
-            by.learn([math.nan] * len(points))
-            if not first:
-                raise ParameterError(
-                    f"the mission cannot be played with any values of a round: {result.refused[0][1]}"
-                )
-            continue
-        played = play(
-            [
-                StressGame((first_seed + first + i) % 2**64, (), tuple(settings_of(points[k], variables).items()), side)
-                for i, k in enumerate(playable)
-                for side in range(sides)
-            ]
-        )  # fmt: skip
+        if not playable and not first:
+            text = label(settings_of(points[0], variables))
+            raise ParameterError(
+                f"the mission cannot be played with any values of a round; with {text}: {result.refused[0][1]}"
+            )
+        asked = [
+            (
+                points[k],
+                StressGame(
+                    (first_seed + first + i) % 2**64, (), tuple(settings_of(points[k], variables).items())
+                ),
+            )
+            for i, k in enumerate(playable)
+        ]
+        parents = _parents(result.games, len(points), first_seed) if has_luck else []
+        for parent, step in parents[: games - first - len(asked)]:
+            key = stream_key("stress", "search", f"{first_seed} {first + len(asked)}")
+            asked.append((parent.values, parent.played.game.branch(step, key)))
+        played = play([replace(game, mission=side) for _, game in asked for side in range(sides)])
         robustness = [math.nan] * len(points)
-        for i, k in enumerate(playable):
+        for i, (values, _) in enumerate(asked):
             other = played[i * sides + 1] if is_differential else None
-            result.games.append(Tried(first + i, points[k], played[i * sides], other))
-            robustness[k] = result.games[-1].robustness
+            result.games.append(Tried(first + i, values, played[i * sides], other))
+            if i < len(playable):
+                robustness[playable[i]] = result.games[-1].robustness
+        branches = result.games[first + len(playable) :]
+        if branches:
+            has_luck = any(
+                b.played.state_hash != p.played.state_hash
+                for b, (p, _) in zip(branches, parents, strict=False)
+            )
         by.learn(robustness)
     failed = sorted((g for g in result.games if g.has_failed), key=lambda g: g.robustness)
     result.failures = different(failed, variables, length)
     return result
+
+
+def _parents(games: Sequence[Tried], n: int, seed: int) -> list[tuple[Tried, int]]:
+    """Games to branch, and the step: good ones, at the first step at which they were nearer to failure than the others of the best."""
+    best = sorted((g for g in games if not g.has_failed), key=lambda g: g.robustness)[:MAX_BEST]
+    level = best[-1].robustness if best else 0.0
+    steps = [g.played.verdict.first_below(level) for g in best]
+    near = [(g, step) for g, step in zip(best, steps, strict=True) if step is not None]
+    draws = uniform(seed, START, np.arange(n), np.full(n, len(games)), 2)[0]
+    return [near[int(draw * len(near))] for draw in draws.tolist()] if near else []
 
 
 def different(failed: Sequence[Tried], variables: Sequence[Variable], length: int) -> list[Tried]:
@@ -296,6 +327,13 @@ def different(failed: Sequence[Tried], variables: Sequence[Variable], length: in
             kept.append(game)
             places.append((choices, place))
     return kept
+
+
+def _value(variable: Variable, share: float) -> Value:
+    """The value at a share of a range, rounded to digits that can be typed; or a choice."""
+    value = variable.value_at(min(max(share, 0.0), 1.0))
+    is_real = isinstance(variable, Range) and variable.levels is None and not variable.is_int
+    return value_of(variable, value) if is_real else value
 
 
 def _place(variable: Range, value: Any) -> float:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
+import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, field
@@ -286,7 +287,9 @@ class Stress:
         check_argument("per_round", per_round, Whole(4, 10**4))
         check_argument("sample_seed", sample_seed, Whole(0, 2**32 - 1))
         if not self.variables and not self.others:
-            raise ParameterError("nothing varies, so there is nothing to search; vary a value, or use `probability`")
+            raise ParameterError(
+                "nothing varies, so there is nothing to search; vary a value, or use `probability`"
+            )
         by = searcher(sampler, self.variables, sample_seed, per_round)
         self.check()
         self._check_effects()
@@ -305,7 +308,7 @@ class Stress:
             for mission in range(1 + len(self.others)):
                 self.mission_of(StressGame(0, (), tuple(values.items()), mission))
         except TussleError as error:
-            return str(error)
+            return re.sub(r"^point 0 \(.*?\): ", "", str(error))
         return ""
 
     def _check_effects(self) -> None:
@@ -326,7 +329,9 @@ class Stress:
 
     def _check_plain(self, name: str) -> None:
         if self.variables or self.others:
-            raise ParameterError(f"{name} plays one mission with one set of values; to vary or compare, use `search`")
+            raise ParameterError(
+                f"{name} plays one mission with one set of values; to vary or compare, use `search`"
+            )
 
     def probability(
         self,
