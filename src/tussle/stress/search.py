@@ -2,8 +2,8 @@
 
 CMA-ES (Hansen, arXiv:1604.00772) searches the ranges of the values as a cube. It begins again elsewhere when a round mostly fails, since it
 would find that failure over and over, and when it does not come nearer to one. Luck is searched too: each game has a seed of its own, and
-beside the proposed games of a round as many branches are played, which repeat one of the games that came nearest up to where it did, and then
-have other luck, as in splitting.
+beside the proposed games of a round as many branches are played, as in splitting: each repeats one of the games that came nearest up to
+where it did, and then has other luck.
 """
 
 from __future__ import annotations

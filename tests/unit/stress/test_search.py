@@ -1,4 +1,4 @@
-"""Searches: failures that are planted are found, kept apart, replayed, compared with another mission, and nothing depends on how games are played."""
+"""Searches find planted failures, keep different ones, replay them, and compare missions; nothing depends on how games are played."""
 
 from __future__ import annotations
 
