@@ -184,6 +184,37 @@ def test_orders_are_carried_out_and_belong_to_the_game(game):
         assert again.state_hash() == there
 
 
+def test_a_route_is_drawn_in_one_stroke(game):
+    _, watched, _ = game
+    tab = watched.tab
+    choose(watched, 5)
+    tab.locator("#order").select_option("0")
+    way = tab.get_by_label("way", exact=True)
+    way.fill("1 2 3")
+    corners = [(350, 300), (500, 300), (500, 420)]
+    watched.button("Draw a line")
+    tab.mouse.move(*corners[0])
+    tab.mouse.down()
+    for corner in corners:
+        tab.mouse.move(*corner, steps=15)
+    tab.mouse.up()
+    watched.wait("document.querySelector('#orders textarea').value.split('\\n').length > 1")
+    drawn = way.input_value().split("\n")
+
+    # The same as the corners that are picked one by one: the view has not turned, and the points between are gone.
+    way.fill("1 2 3")
+    for n, corner in enumerate(corners, 2):
+        watched.button("Add a point on the ground")
+        tab.mouse.click(*corner)
+        watched.wait(f"document.querySelector('#orders textarea').value.split('\\n').length === {n}")
+    assert way.input_value().split("\n") == drawn
+
+    watched.button("Draw a line")
+    tab.mouse.click(*corners[0])
+    watched.wait("document.querySelector('#said').innerText.startsWith('No line is drawn')")
+    assert way.input_value().split("\n") == drawn
+
+
 def test_the_messages_of_the_game_are_shown_while_they_are_asked_for(game):
     live, watched, _ = game
     tab = watched.tab

@@ -3,6 +3,7 @@
 /** @import { Player } from './player.js' */
 
 import { byId, element, say } from './formatting.js';
+import { simplified } from './geometry.js';
 import { Live } from './live.js';
 
 /** Receivers of one command: of more, several are sent. */
@@ -115,6 +116,14 @@ export class OrderForm {
       button.type = 'button';
       button.addEventListener('click', () => this.player.pick(true, (pos) => this.takePlace(box, pos, field)));
       box.append(button);
+      if (isList) {
+        const stroke = element('button', '', 'Draw a line');
+        stroke.type = 'button';
+        stroke.addEventListener('click', () => this.player.pickStroke((line) => {
+          for (const pos of simplified(line, this.player.camera.distance / 100)) this.takePlace(box, pos, field);
+        }));
+        box.append(stroke);
+      }
     }
     return box;
   }
