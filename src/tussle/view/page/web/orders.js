@@ -37,7 +37,7 @@ export class OrderForm {
     const isThere = Boolean(entity && entity.id === chosen && layer.slotOf(chosen) >= 0 && this.may(chosen));
     this.form.hidden = !isThere;
     if (!isThere) return;
-    const key = JSON.stringify([entity.orders, layer.status.steers, this.block]);
+    const key = JSON.stringify([entity.orders, this.maySpawn, this.block]);
     if (key === this.offered) return;
     this.offered = key;
     this.kinds = entity.orders;
@@ -49,7 +49,7 @@ export class OrderForm {
       made.label = label;
       made.append(...some);
       return made;
-    }), new Option('Remove it', REMOVE), ...(layer.status.steers && this.block ? [new Option(`Add one to ${this.block}`, SPAWN)] : []));
+    }), new Option('Remove it', REMOVE), ...(this.maySpawn && this.block ? [new Option(`Add one to ${this.block}`, SPAWN)] : []));
     this.fill();
   }
 
@@ -70,6 +70,12 @@ export class OrderForm {
   get block() {
     const { layer, chosen, page } = this.player;
     return page.blocks[layer.shown.block[layer.slotOf(chosen)]]?.name;
+  }
+
+  /** Whether this address may add entities. */
+  get maySpawn() {
+    const { layer } = this.player;
+    return layer instanceof Live && layer.status.steers;
   }
 
   get isSpawn() {
