@@ -24,7 +24,7 @@ from tussle.record.run_file import put_whole
 from tussle.stress.chances import Chance
 from tussle.stress.confidence import Assurance, junit_xml
 from tussle.stress.games import Played
-from tussle.stress.search import Search, label
+from tussle.stress.search import FailureSearch, label
 from tussle.stress.shrink import SmallestGame
 from tussle.stress.study import FAILURES, MAX_FAILURES, Probability, Sample, Stress
 
@@ -153,7 +153,7 @@ def show_sample(sample: Sample, study: Stress, directory: Path, options: StressO
     show_failures(sample.failures, study, directory, options)
 
 
-def show_search(found: Search, study: Stress, directory: Path, options: StressOptions) -> None:
+def show_search(found: FailureSearch, study: Stress, directory: Path, options: StressOptions) -> None:
     """Show what a search found."""
     n, nearest = len(found.games), found.nearest
     other = "; the same game of the other mission does not" if study.others else ""

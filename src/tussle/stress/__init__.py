@@ -5,7 +5,7 @@ from tussle.stress.confidence import Assurance
 from tussle.stress.games import Played, StressGame
 from tussle.stress.given import GivenGame, given_games
 from tussle.stress.monitor import Monitor, Verdict
-from tussle.stress.search import Search, Tried
+from tussle.stress.search import FailureSearch, Tried
 from tussle.stress.shrink import SmallestGame
 from tussle.stress.specification import Specification
 from tussle.stress.splitting import Repetition
@@ -14,13 +14,13 @@ from tussle.stress.study import Probability, Sample, Stress
 __all__ = [
     "Assurance",
     "Chance",
+    "FailureSearch",
     "GivenGame",
     "Monitor",
     "Played",
     "Probability",
     "Repetition",
     "Sample",
-    "Search",
     "SmallestGame",
     "Specification",
     "Stress",

@@ -66,7 +66,7 @@ class Tried:
 
 
 @dataclass
-class Search:
+class FailureSearch:
     """What a search found.
 
     Attributes:
@@ -233,7 +233,7 @@ def search(
     first_seed: int,
     length: int,
     is_differential: bool,
-) -> Search:
+) -> FailureSearch:
     """Search until a number of games has been played.
 
     Args:
@@ -250,7 +250,7 @@ def search(
     Raises:
         ParameterError: The mission cannot be played with any values of the first rounds.
     """
-    result = Search(variables, [], [])
+    result = FailureSearch(variables, [], [])
     sides, has_luck = 1 + is_differential, True
     while len(result.games) < games and len(result.refused) <= games and result.n_failed < failures:
         points, first = by.propose(), len(result.games)

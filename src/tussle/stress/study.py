@@ -32,7 +32,7 @@ from tussle.record.run_file import plain, put_whole, versions
 from tussle.stress.chances import Chance, chances
 from tussle.stress.games import GamePlayer, Ledger, Played, StressGame
 from tussle.stress.monitor import Watching
-from tussle.stress.search import Search, search, searcher
+from tussle.stress.search import FailureSearch, search, searcher
 from tussle.stress.shrink import MAX_SHRINK_GAMES, SmallestGame, shrink
 from tussle.stress.specification import Function, Specification, columns_of
 from tussle.stress.splitting import Repetition, interval, split
@@ -266,7 +266,7 @@ class Stress:
         failures: int | None = None,
         directory: str | Path | None = None,
         **how: Any,
-    ) -> Search:
+    ) -> FailureSearch:
         """Search for values and seeds with which games fail; with `against`, while the same game of the other mission does not.
 
         Args:
