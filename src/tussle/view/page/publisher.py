@@ -8,7 +8,7 @@ import math
 import time
 from collections import deque
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -29,8 +29,16 @@ from tussle.view.page.formatting import entity_sections, result_rows
 from tussle.view.page.packing import message
 from tussle.view.series import OF_TEAMS, Changes, CurveName, StepSeries
 
-if TYPE_CHECKING:
-    from aiohttp.web import WebSocketResponse
+
+class Socket(Protocol):
+    """A connection to a browser: aiohttp's websocket, or a cell of a notebook."""
+
+    @property
+    def closed(self) -> bool: ...
+    async def receive(self) -> Any: ...
+    async def send_str(self, data: str) -> None: ...
+    async def send_bytes(self, data: bytes) -> None: ...
+
 
 PERIOD = 1.0 / 30.0
 """Least time between two frames [s]."""
@@ -59,7 +67,7 @@ class Reader:
         wake: There is something to be sent.
     """
 
-    def __init__(self, socket: WebSocketResponse) -> None:
+    def __init__(self, socket: Socket) -> None:
         self.socket = socket
         self.chosen = 0
         self.wake = asyncio.Event()
@@ -164,7 +172,7 @@ class FramePublisher:
 
     # -- one browser ----------------------------------------------------------------------------------------------------------------
 
-    async def serve(self, socket: WebSocketResponse) -> None:
+    async def serve(self, socket: Socket) -> None:
         """Send to a browser and take what it sends, until it goes."""
         reader = Reader(socket)
         self.readers.append(reader)

@@ -1,0 +1,175 @@
+"""Widgets of `tussle.view.notebook`, which need anywidget."""
+
+from __future__ import annotations
+
+import asyncio
+from dataclasses import dataclass
+from html import escape
+from typing import Any
+
+import anywidget
+import traitlets
+
+from tussle.view.live import Live
+from tussle.view.notebook import loop_of_kernel
+from tussle.view.page.access import MAX_BROWSERS, MAX_BYTES
+from tussle.view.page.assemble import FRAMED, page_html, web_text
+from tussle.view.page.document import game_document, scenery_blobs
+from tussle.view.page.failures import Failures
+from tussle.view.page.publisher import PERIOD, FramePublisher
+from tussle.view.page.recorded import RecordedData
+
+NEEDS_KERNEL = "This 3D view needs its kernel: run the cell again."
+
+
+class _Widget(anywidget.AnyWidget):
+    """The page in a cell, and what it asks for.
+
+    Args:
+        html: The page.
+        height: Height of the view [pixels].
+    """
+
+    _esm = web_text("widget.js")
+    html = traitlets.Unicode().tag(sync=True)
+    height = traitlets.Int().tag(sync=True)
+
+    def __init__(self, html: str, height: int) -> None:
+        self._failures = Failures()
+        super().__init__(html=html, height=height)  # type: ignore[no-untyped-call]
+        self.on_msg(self._receive)  # type: ignore[no-untyped-call]
+
+    def _repr_mimebundle_(self, **options: Any) -> Any:
+        shown = super()._repr_mimebundle_(**options)
+        # What programs show that have no widgets, such as a converted notebook.
+        data = shown[0] if isinstance(shown, tuple) else shown
+        if data is not None:
+            data |= {"text/plain": NEEDS_KERNEL, "text/html": f"<p>{escape(NEEDS_KERNEL)}</p>"}
+        return shown
+
+    def _receive(self, _: object, content: Any, buffers: object) -> None:
+        if isinstance(content, dict) and isinstance(content.get("view"), str):
+            with self._failures.caught():
+                self._take(content["view"], content)
+
+    def _take(self, view: str, content: dict[str, Any]) -> None:
+        """Answer a message of a cell that shows the widget."""
+        if content.get("do") != "blob":
+            return
+        name = str(content.get("name"))
+        answer: dict[str, Any] = {"do": "blob", "view": view, "name": name}
+        try:
+            data = self._blob(name)
+            if data is None:
+                answer["error"] = "There is nothing of this name."
+        except Exception as error:  # noqa: BLE001 - whatever it is, whoever watches reads it, and the page goes on
+            data, answer["error"] = None, self._failures.tell(error)
+        self.send(answer, [] if data is None else [data])  # type: ignore[no-untyped-call]
+
+    def _blob(self, name: str) -> bytes | None:
+        return None
+
+
+class RunWidget(_Widget):
+    """A recorded run that is too large for a cell.
+
+    Args:
+        data: Its data.
+        html: Its page.
+        height: Height of the view [pixels].
+    """
+
+    def __init__(self, data: RecordedData, html: str, height: int) -> None:
+        self._data = data
+        super().__init__(html, height)
+
+    def _blob(self, name: str) -> bytes | None:
+        return self._data.blob(name)
+
+
+class GameWidget(_Widget):
+    """A simulation that is played in a cell.
+
+    Args:
+        live: The game.
+        height: Height of the view [pixels].
+
+    Attributes:
+        live: Controls of the game.
+    """
+
+    def __init__(self, live: Live, height: int) -> None:
+        self.live = live
+        failures = Failures()
+        self._publisher = FramePublisher(live, failures, PERIOD, one_steers=False)
+        self._scenery = scenery_blobs(live.scenery)
+        self._cells: dict[str, _Cell] = {}
+        document = game_document(live, live.simulation.mission, live.viewer) | self._publisher.document()
+        super().__init__(page_html(document | {"source": "framedLive"}, entry=FRAMED), height)
+        self._failures = failures
+        self._loop = loop_of_kernel()
+        self._tasks = [asyncio.run_coroutine_threadsafe(self._publisher.run(), self._loop)]
+
+    def _blob(self, name: str) -> bytes | None:
+        return self._scenery.get(name)
+
+    def _take(self, view: str, content: dict[str, Any]) -> None:
+        super()._take(view, content)
+        do, cell, text = content.get("do"), self._cells.get(view), content.get("text")
+        if do == "watch" and cell is None and len(self._cells) < MAX_BROWSERS:
+            cell = self._cells[view] = _Cell(self, view)
+            self._tasks.append(asyncio.run_coroutine_threadsafe(self._publisher.serve(cell), self._loop))
+        elif cell is not None and do == "taken":
+            self._loop.call_soon_threadsafe(cell.taken.set)
+        elif cell is not None and do == "command" and isinstance(text, str) and len(text) <= MAX_BYTES:
+            self._loop.call_soon_threadsafe(cell.received.put_nowait, text)
+        elif cell is not None and do == "leave":
+            del self._cells[view]
+            self._loop.call_soon_threadsafe(cell.leave)
+
+    def stop(self) -> None:
+        """End the game and release the simulation. A second call does nothing."""
+        for view, cell in list(self._cells.items()):
+            self.send({"do": "lost", "view": view})  # type: ignore[no-untyped-call]
+            self._loop.call_soon_threadsafe(cell.leave)
+        self._cells.clear()
+        for task in self._tasks[:1]:
+            task.cancel()
+        self.live.stop()
+
+
+@dataclass(frozen=True)
+class _Received:
+    """A message of a cell, as a websocket gives it; None at its end."""
+
+    data: str | None
+
+
+class _Cell:
+    """A cell that shows a game: what `FramePublisher` needs of a websocket. One message is under way at a time."""
+
+    def __init__(self, widget: GameWidget, view: str) -> None:
+        self._widget, self._view = widget, view
+        self.closed = False
+        self.received: asyncio.Queue[str | None] = asyncio.Queue()
+        self.taken = asyncio.Event()
+        self.taken.set()
+
+    def leave(self) -> None:
+        """The cell shows the game no longer."""
+        self.closed = True
+        self.received.put_nowait(None)
+
+    async def receive(self) -> _Received:
+        return _Received(await self.received.get())
+
+    async def send_str(self, text: str) -> None:
+        await self._send({"text": text}, [])
+
+    async def send_bytes(self, data: bytes) -> None:
+        await self._send({}, [data])
+
+    async def _send(self, content: dict[str, Any], buffers: list[bytes]) -> None:
+        await self.taken.wait()
+        self.taken.clear()
+        self._widget.send({"do": "game", "view": self._view, **content}, buffers)  # type: ignore[no-untyped-call]
