@@ -25,7 +25,9 @@ EXPORT = re.compile(r"^export (?=\w)", re.MULTILINE)
 NO_MARKUP = str.maketrans({c: f"\\u{ord(c):04x}" for c in "<>&"})
 
 
-def page_html(document: Mapping[str, Any], blobs: Mapping[str, bytes] | None = None, entry: str = SERVED) -> str:
+def page_html(
+    document: Mapping[str, Any], blobs: Mapping[str, bytes] | None = None, entry: str = SERVED
+) -> str:
     """Return the HTML text of the page.
 
     Args:
