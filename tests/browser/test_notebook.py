@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import base64
 import json
 import sys
@@ -12,12 +11,16 @@ from recorded_games import hunt, record
 
 from tussle import Simulation, load_run
 from tussle.errors import MissingExtraError, ParameterError
+from tussle.view import Recording
 from tussle.view.page.assemble import web_text
 
 HOST = """<!doctype html><link rel="icon" href="data:,"><div id="cell"></div><script type="module">
 %s
 const listeners = [];
-const model = { get: (name) => window.traits[name], on: (_, f) => listeners.push(f), off: () => {}, send: (m) => window.kernel(JSON.stringify(m)) };
+const model = {
+  get: (name) => window.traits[name], on: (_, f) => listeners.push(f), off: () => {},
+  send: (m) => window.kernel(JSON.stringify(m)),
+};
 window.deliver = (content, data) => {
   const buffers = data ? [new DataView(Uint8Array.from(atob(data), (c) => c.charCodeAt(0)).buffer)] : [];
   listeners.forEach((f) => f(content, buffers));
@@ -68,10 +71,10 @@ def test_a_recorded_run_is_whole_in_its_cell(folder, watched):
     page.set_content(f'<link rel="icon" href="data:,">{load_run(folder).view(height=400)._repr_html_()}')
     frame = page.frames[-1]
     for _ in range(1500):
-        if frame.evaluate("() => Boolean(window.player && player.isReady)"):
+        if frame.evaluate("() => Boolean(window.player && player.isReady && player.ids.length)"):
             break
         page.wait_for_timeout(20)
-    assert frame.evaluate("() => player.ids.length") == 7
+    assert sorted(frame.evaluate("() => player.ids")) == Recording(folder).frame(0).id.tolist()
     assert page.locator("iframe").bounding_box()["height"] == 400
     frame.evaluate("() => document.activeElement.blur()")
     frame.locator("canvas").first.click(position={"x": 5, "y": 200})
@@ -85,18 +88,17 @@ def test_a_large_run_asks_the_kernel_for_what_it_shows(folder, watched, monkeypa
     monkeypatch.setattr("tussle.view.notebook.MAX_STATES", 10)
     notebook = Notebook(watched("nothing"), load_run(folder).view())
     assert len(notebook.widget.html) < 400_000
-    notebook.wait("player.isReady && player.ids.length === 7")
+    notebook.wait(f"player.isReady && player.ids.length === {len(Recording(folder).frame(0))}")
     notebook.widget._receive(None, {"do": "blob", "view": "other", "name": "nothing"}, [])
     assert notebook.sent[-1][0]["error"] == "There is nothing of this name."
 
 
 def test_a_simulation_is_played_in_its_cell(watched):
     pytest.importorskip("anywidget")
-    asyncio.get_event_loop()  # the browser's driver runs in it, as a kernel does
     with Simulation(hunt(n_prey=6, end=60.0), 3) as simulation:
         notebook = Notebook(watched("nothing"), simulation.view())
         live = notebook.widget.live
-        notebook.wait("player.isReady && player.t === 0 && player.ids.length === 7")
+        notebook.wait(f"player.isReady && player.t === 0 && player.ids.length === {len(live.frame())}")
         notebook.frame.get_by_role("button", name="Play", exact=True).first.click()
         notebook.until(lambda: live.step_number > 3)
         notebook.wait("player.t > 0")

@@ -17,7 +17,7 @@ from tussle.view.page.recorded import RecordedData
 from tussle.view.recording import Recording
 
 MAX_STATES = 500_000
-"""Largest number of states of a run that its cell holds whole, at some 10 B each. Pages of larger runs ask the kernel for what they show."""
+"""Largest number of states of a run that its cell holds whole, at some 10 B each. Larger runs ask the kernel for what they show."""
 HEIGHT = Whole(100, 4000)
 """Allowed heights of a view [pixels]."""
 

@@ -36,8 +36,8 @@ class _Widget(anywidget.AnyWidget):
 
     def __init__(self, html: str, height: int) -> None:
         self._failures = Failures()
-        super().__init__(html=html, height=height)  # type: ignore[no-untyped-call]
-        self.on_msg(self._receive)  # type: ignore[no-untyped-call]
+        super().__init__(html=html, height=height)
+        self.on_msg(self._receive)
 
     def _repr_mimebundle_(self, **options: Any) -> Any:
         shown = super()._repr_mimebundle_(**options)
@@ -64,7 +64,7 @@ class _Widget(anywidget.AnyWidget):
                 answer["error"] = "There is nothing of this name."
         except Exception as error:  # noqa: BLE001 - whatever it is, whoever watches reads it, and the page goes on
             data, answer["error"] = None, self._failures.tell(error)
-        self.send(answer, [] if data is None else [data])  # type: ignore[no-untyped-call]
+        self.send(answer, [] if data is None else [data])
 
     def _blob(self, name: str) -> bytes | None:
         return None
@@ -130,7 +130,7 @@ class GameWidget(_Widget):
     def stop(self) -> None:
         """End the game and release the simulation. A second call does nothing."""
         for view, cell in list(self._cells.items()):
-            self.send({"do": "lost", "view": view})  # type: ignore[no-untyped-call]
+            self.send({"do": "lost", "view": view})
             self._loop.call_soon_threadsafe(cell.leave)
         self._cells.clear()
         for task in self._tasks[:1]:
@@ -172,4 +172,4 @@ class _Cell:
     async def _send(self, content: dict[str, Any], buffers: list[bytes]) -> None:
         await self.taken.wait()
         self.taken.clear()
-        self._widget.send({"do": "game", "view": self._view, **content}, buffers)  # type: ignore[no-untyped-call]
+        self._widget.send({"do": "game", "view": self._view, **content}, buffers)
