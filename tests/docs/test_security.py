@@ -4,6 +4,7 @@ import ast
 import re
 
 from pages import ROOT
+from tree import parsed
 
 
 def test_every_promise_names_tests_that_exist():
@@ -13,7 +14,7 @@ def test_every_promise_names_tests_that_exist():
     defined = {
         node.name
         for path in (ROOT / "tests").rglob("test_*.py")
-        for node in ast.walk(ast.parse(path.read_text()))
+        for node in ast.walk(parsed(path))
         if isinstance(node, ast.FunctionDef)
     }
     assert len(rows) > 20

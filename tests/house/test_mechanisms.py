@@ -6,7 +6,7 @@ import ast
 import re
 
 import pytest
-from tree import python_files, relative
+from tree import parsed, python_files, relative
 
 ONCE = {
     ("exec",): {"src/tussle/numeric/source.py"},
@@ -22,21 +22,21 @@ ONCE = {
 """Names of a function -> the modules that call it."""
 
 
-def calls(text: str, names: tuple[str, ...]) -> bool:
+def calls(tree: ast.AST, names: tuple[str, ...]) -> bool:
     """Whether a module calls a function by one of its names."""
-    nodes = (node for node in ast.walk(ast.parse(text)) if isinstance(node, ast.Call))
+    nodes = (node for node in ast.walk(tree) if isinstance(node, ast.Call))
     return any(ast.unparse(node.func) in names for node in nodes)
 
 
 @pytest.mark.parametrize("names", ONCE, ids=lambda names: names[0])
 def test_it_is_called_where_it_belongs(names):
-    found = {relative(path) for path in python_files("src") if calls(path.read_text(encoding="utf-8"), names)}
+    found = {relative(path) for path in python_files("src") if calls(parsed(path), names)}
     assert found == ONCE[names]
 
 
 def test_the_rule_sees_calls():
-    assert calls("def f():\n    exec(text, {})", ("exec",))
-    assert not calls("executor.submit(exec_all)", ("exec",))
+    assert calls(ast.parse("def f():\n    exec(text, {})"), ("exec",))
+    assert not calls(ast.parse("executor.submit(exec_all)"), ("exec",))
 
 
 def test_limits_have_one_prefix():
@@ -45,7 +45,7 @@ def test_limits_have_one_prefix():
     found = {
         f"{relative(path)}: {node.id}"
         for path in python_files("src")
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        for node in ast.walk(parsed(path))
         if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store) and wrong.fullmatch(node.id)
     }
     assert not found

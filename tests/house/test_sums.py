@@ -3,7 +3,7 @@
 import ast
 from pathlib import Path
 
-from tree import ROOT
+from tree import ROOT, parsed
 
 PLACES = ("aircraft", "numeric", "plugins", "world")
 WHOLE = {
@@ -17,9 +17,7 @@ WHOLE = {
 
 def sums(path: Path) -> bool:
     """Return whether a module calls Python's `sum`."""
-    calls = (
-        node for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))) if isinstance(node, ast.Call)
-    )
+    calls = (node for node in ast.walk(parsed(path)) if isinstance(node, ast.Call))
     return any(isinstance(call.func, ast.Name) and call.func.id == "sum" for call in calls)
 
 

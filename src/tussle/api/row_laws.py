@@ -193,6 +193,10 @@ class Rows:
         both = [each for each in first if each in written]
         self.given = [*(each for each in first if each not in written), *both]
         self.kept = [*both, *(each for each in written if each not in both)]
+        bodies = dict.fromkeys(
+            BODY[str(each.key)][0] for each in self.given if not isinstance(each.key, tuple)
+        )
+        self.derived = [name for name in bodies if name in DERIVED]
         codes = f"({' '.join('F' * len(self.given))}) ({' '.join(['Fw'] * len(self.kept))})"
         further, names = more
         arguments = f"own, out, dt, substeps, {names}part"
@@ -204,15 +208,31 @@ class Rows:
         rows_per_thread: int = ROWS_PER_THREAD,
     ) -> None:  # fmt: skip
         """Run the laws for all rows of a view, in substeps of dt [s] each; `own` returns the column of a key, (n,)."""
+        arrays = g.kept.get(self)
+        if arrays is None:
+            arrays = self._arrays(g, own)
+        for name in self.derived:
+            g.column(name)  # computes it again, in place, if the attitudes have changed
+        given, kept = arrays
+        g.split(self.kernel, given, kept, dt, substeps, *more, least=rows_per_thread)
+
+    def _arrays(self, g: GroupView, own: Callable[..., np.ndarray]) -> tuple[tuple[np.ndarray, ...], ...]:
+        """The columns that the kernel loads and stores; kept until rows change, if none had to be converted."""
 
         def column(number: Number) -> np.ndarray:
             if isinstance(number.key, tuple):
-                return np.asarray(own(*number.key), float)
+                return own(*number.key)
             name, place = BODY[str(number.key)]
-            return np.asarray(np.atleast_2d(g.column(name))[place], float)
+            return np.asarray(np.atleast_2d(g.column(name))[place])
 
-        given, kept = tuple(map(column, self.given)), tuple(map(column, self.kept))
-        g.split(self.kernel, given, kept, dt, substeps, *more, least=rows_per_thread)
+        given, kept = list(map(column, self.given)), list(map(column, self.kept))
+        arrays = (
+            tuple(np.asarray(each, float) for each in given),
+            tuple(np.asarray(each, float) for each in kept),
+        )
+        if all(each.dtype == float for each in (*given, *kept)):
+            g.kept[self] = arrays
+        return arrays
 
 
 def step_rows(plugin: Any, g: GroupView) -> None:

@@ -26,13 +26,10 @@ def damage_in_batch(path: str | Path) -> tuple[list[str], list[str]]:
     damage, unchecked = list[str](), list[str]()
     try:
         info = store.read_info(place)
-        damage += store.damage(place)
+        damage += store.damage(place, info)
         for name in (store.DESIGN_FILE, store.RESULTS_FILE, store.ALIVE_FILE):
             file = place / name
-            if not file.exists():
-                if info["is_complete"]:
-                    damage.append(f"{name} is missing")
-            elif not damage:
+            if file.exists() and not damage:
                 with file.open("rb") as opened:
                     if intact_groups(opened, file.stat().st_size) is None:
                         unchecked.append(f"{name} has no checksums")

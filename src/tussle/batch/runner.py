@@ -277,7 +277,7 @@ def is_played(batch: Playable, path: Path, until: Rule | None) -> bool:
         return False
     info = files.read_info(path)
     _check_same(batch, path, info)
-    return _has_all(info, batch.plan, until) and not files.damage(path)
+    return _has_all(info, batch.plan, until) and not files.damage(path, info)
 
 
 def _check_same(batch: Playable, path: Path, before: dict[str, Any]) -> None:

@@ -379,15 +379,17 @@ def load(path: str | Path) -> StoredBatch:
     """
     path = Path(path)
     info = read_info(path)
-    design = read_table(path, DESIGN_FILE, DESIGN)
-    if design is None:
+    lacking: list[str] = []
+    design = read_table(path, DESIGN_FILE, DESIGN, lacking)
+    if design is None or lacking:
+        what = lacking[0] if lacking else f"{DESIGN_FILE} is not there"
         raise BatchError(
-            f"{path}: {DESIGN_FILE} is not there: the batch was stopped before its first run; play it again"
+            f"{path}: {what}; the command of the batch writes it again, and keeps the finished runs"
         )
     check_design(design, info, path / DESIGN_FILE)
     played, notes = read_played(path)
     if info["is_complete"] and not (path / RESULTS_FILE).exists():
-        raise BatchError(f"{path}: {RESULTS_FILE} is not there, though the batch was complete")
+        raise BatchError(f"{path}: {RESULTS_FILE} is missing; the command of the batch plays its runs again")
     results, alive = merged(path, played, design, notes)
     n = len(pc.unique(results["run"]))
     if not info["is_complete"]:
@@ -399,15 +401,16 @@ def load(path: str | Path) -> StoredBatch:
     return StoredBatch(path, info, design, results, alive, notes)
 
 
-def damage(path: Path) -> list[str]:
-    """Describe what is damaged in the tables of a directory, one line each.
+def damage(path: Path, info: dict[str, Any]) -> list[str]:
+    """Describe what is damaged in the tables of a directory, or missing in that of a complete batch, one line each.
 
     Raises:
         BatchError: A table is another one.
     """
     notes: list[str] = []
     for name, columns in ((DESIGN_FILE, DESIGN), (RESULTS_FILE, RESULTS), (ALIVE_FILE, ALIVE)):
-        read_table(path, name, columns, notes)
+        if read_table(path, name, columns, notes) is None and info["is_complete"]:
+            notes.append(f"{name} is missing")
     return notes
 
 
@@ -421,7 +424,7 @@ def merged(path: Path, played: pa.Table, design: pa.Table, notes: list[str]) -> 
         notes: Receives a line for each table that is damaged.
 
     Raises:
-        BatchError: A table is another one, or is missing.
+        BatchError: A table is another one.
     """
     old = read_table(path, RESULTS_FILE, RESULTS, notes)
     n_notes = len(notes)
@@ -429,7 +432,8 @@ def merged(path: Path, played: pa.Table, design: pa.Table, notes: list[str]) -> 
     if old is not None and old_alive is not None and len(notes) > n_notes:
         old = old.filter(pc.is_in(old["run"], pc.unique(old_alive["run"]).cast(pa.int64())))
     if old is not None and old_alive is None:
-        raise BatchError(f"{path}: {ALIVE_FILE} is not there, but {RESULTS_FILE} is; the batch is damaged")
+        notes.append(f"{ALIVE_FILE} is missing")
+        old = None
     for table, name in ((old, RESULTS_FILE), (old_alive, ALIVE_FILE)):
         if table is not None:
             check_results(table, design, path / name)

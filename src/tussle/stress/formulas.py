@@ -227,7 +227,10 @@ class UntilHolds(Formula):
 
 def records(known: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Samples at which the least robustness so far falls, and what it falls to: where a game comes nearer to failure, and how near."""
-    falls = np.flatnonzero(known < np.concatenate([[np.inf], known[:-1]]))
+    is_lower = np.empty(len(known), bool)
+    is_lower[:1] = known[:1] < np.inf
+    np.less(known[1:], known[:-1], out=is_lower[1:])
+    (falls,) = is_lower.nonzero()
     return falls, known[falls]
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import operator
+from bisect import bisect_right
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
@@ -39,7 +41,8 @@ class Verdict:
 
     def first_below(self, level: float) -> int | None:
         """The first step at which the game is known to be nearer to failure than a level; None for never."""
-        return next((k for k, found in zip(self.steps, self.levels, strict=True) if found < level), None)
+        below = bisect_right(self.levels, -level, key=operator.neg)
+        return self.steps[below] if below < len(self.steps) else None
 
 
 class Monitor:

@@ -8,6 +8,7 @@ import math
 import os
 import shutil
 import subprocess
+import warnings
 
 import gambles
 import pyarrow as pa
@@ -15,6 +16,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from tussle.batch import Batch, InProcess, load_batch, store
+from tussle.batch.damage import damage_in_batch
 from tussle.batch.plan import BatchPlan
 from tussle.batch.store import Store
 from tussle.batch.tasks import Finished
@@ -204,11 +206,43 @@ def test_a_batch_that_was_killed_as_it_began_goes_on(mission, reference, tmp_pat
         shutil.rmtree(path / "mission.part")
         (path / "design.parquet.part").unlink()
     elif "design.parquet" in gone:
-        with pytest.raises(BatchError, match="was stopped before its first run; play it again"):
+        with pytest.raises(
+            BatchError, match=r"design[.]parquet is not there; the command of the batch writes it again"
+        ):
             load_batch(path)
     play(batch_of(mission), path)
     assert tables_of(path) == tables_of(reference)
     assert sorted(p.name for p in path.iterdir()) == sorted(p.name for p in reference.iterdir())
+
+
+@pytest.mark.parametrize("name", ["design.parquet", "results.parquet", "alive.parquet"])
+@pytest.mark.parametrize("data", [None, b"", b"text", "half", "flipped"])
+def test_a_complete_batch_without_one_of_its_tables_is_told_and_made_whole_by_its_command(
+    mission, reference, tmp_path, name, data
+):
+    path = tmp_path / "out"
+    shutil.copytree(reference, path)
+    before = (path / name).read_bytes()
+    made = {
+        "half": before[: len(before) // 2],
+        "flipped": before[:40] + bytes([before[40] ^ 8]) + before[41:],
+    }
+    if data is None:
+        (path / name).unlink()
+    else:
+        (path / name).write_bytes(made.get(data, data))
+    (told,) = damage_in_batch(path)[0]
+    assert name in told
+    if name == store.DESIGN_FILE or (data is None and name == store.RESULTS_FILE):
+        with pytest.raises(BatchError, match="the command of the batch"):
+            load_batch(path)
+    else:
+        assert load_batch(path).notes[-1].startswith("0 of ")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        play(batch_of(mission), path)
+    assert tables_of(path) == tables_of(reference)
+    assert damage_in_batch(path) == ([], [])
 
 
 def test_a_part_that_was_cut_at_any_byte_gives_its_whole_runs(mission, reference, tmp_path):
@@ -274,22 +308,6 @@ def test_a_table_that_is_damaged_is_told_and_never_believed(mission, reference, 
     pq.write_table(pa.table({"run": [1]}), file)
     with pytest.raises(BatchError, match="is another table; it has no column"):
         load_batch(reference)
-
-
-@pytest.mark.parametrize(
-    ("name", "words"),
-    [
-        (store.RESULTS_FILE, "results.parquet is not there"),
-        (store.ALIVE_FILE, "alive.parquet is not there"),
-        (store.DESIGN_FILE, "design.parquet is not there"),
-    ],
-)
-def test_a_table_that_is_missing_is_told(mission, reference, name, words):
-    (reference / name).unlink()
-    with pytest.raises(BatchError, match=words):
-        load_batch(reference)
-    with pytest.raises(BatchError, match=words):
-        play(batch_of(mission), reference)
 
 
 @pytest.mark.parametrize(

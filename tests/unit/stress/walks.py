@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
 from tussle.numeric.rng import normal, stream_key, uniform
@@ -9,28 +11,38 @@ from tussle.stress import Played, Verdict
 from tussle.stress.formulas import records
 
 STREAM = stream_key("walk")
+NORMAL, UNIFORM = 0, 1  # kinds of draws
+CHUNK = 2000  # games whose arrays fit the processor's cache
 
 
 def playing(path, steps):
-    """A function that plays games of a process: path(normals, uniforms), (n, steps) each, returns robustness, (n, steps + 1)."""
+    """A function that plays games of a process: path(draw, n) returns robustness, (n, steps + 1), draw(NORMAL) numbers, (n, steps)."""
+    at = np.tile(np.arange(steps), CHUNK)
+
+    def draw(kind, keys):
+        numbers = {NORMAL: normal, UNIFORM: uniform}[kind](keys.ravel(), STREAM + kind, 0, at[: keys.size])
+        return numbers[0].reshape(keys.shape)
 
     def play(games):
-        keys = np.empty((len(games), steps), np.uint64)
-        for row, game in zip(keys, games, strict=True):
-            row[:] = game.seed
-            for step, key in game.rekeys:
-                row[step:] = key
-        at = np.tile(np.arange(steps), len(games))
-        z = normal(keys.ravel(), STREAM, 0, at)[0].reshape(-1, steps)
-        u = uniform(keys.ravel(), STREAM + 1, 0, at)[0].reshape(-1, steps)
         found = []
-        for game, row in zip(games, np.minimum.accumulate(path(z, u), axis=1), strict=True):
-            falls, levels = records(row)
-            verdict = Verdict(float(row[-1]), falls.tolist(), levels.tolist())
-            found.append(Played(game, verdict, float(steps), 0.0, f"{game.name}"))
+        for first in range(0, len(games), CHUNK):
+            some = games[first : first + CHUNK]
+            keys = np.repeat(np.array([game.seed for game in some], np.uint64)[:, None], steps, axis=1)
+            for row, game in zip(keys, some, strict=True):
+                for step, key in game.rekeys:
+                    row[step:] = key
+            robustness = np.minimum.accumulate(path(partial(draw, keys=keys), len(some)), axis=1)
+            found += map(partial(_played, steps), some, robustness)
         return found
 
     return play
+
+
+def _played(steps, game, robustness):
+    falls, levels = records(robustness)
+    return Played(
+        game, Verdict(float(robustness[-1]), falls.tolist(), levels.tolist()), float(steps), 0.0, ""
+    )
 
 
 def brownian(p):
@@ -42,11 +54,11 @@ def brownian(p):
 
     steps, b = 60, norm.isf(p / 2)
 
-    def path(z, u):
-        dx = z / np.sqrt(steps)
+    def path(draw, n):
+        dx = draw(NORMAL) / np.sqrt(steps)
         x = np.cumsum(dx, axis=1)
-        top = 0.5 * (2 * x - dx + np.sqrt(dx**2 - 2.0 / steps * np.log1p(-u)))
-        return b - np.concatenate([np.zeros((len(z), 1)), top], axis=1)
+        top = 0.5 * (2 * x - dx + np.sqrt(dx**2 - 2.0 / steps * np.log1p(-draw(UNIFORM))))
+        return b - np.concatenate([np.zeros((n, 1)), top], axis=1)
 
     return playing(path, steps), p
 
@@ -72,8 +84,8 @@ def ornstein_uhlenbeck(p):
 
     b = brentq(lambda b: np.log(passage(b) / p), 0.5, 9.0)
 
-    def path(z, u):
-        x, out = np.zeros(len(z)), [np.full(len(z), b)]
+    def path(draw, n):
+        x, out, z = np.zeros(n), [np.full(n, b)], draw(NORMAL)
         for k in range(steps):
             x = a * x + s * z[:, k]
             out.append(b - x)
@@ -94,8 +106,8 @@ def chain(p):
 
     q = brentq(lambda q: np.log(reached(q) / p), 1e-9, 0.6)
 
-    def path(z, u):
-        x, out = np.zeros(len(u), int), [np.full(len(u), 1.5)]
+    def path(draw, n):
+        x, out, u = np.zeros(n, int), [np.full(n, 1.5)], draw(UNIFORM)
         for k in range(steps):
             up = (x < 2) & (u[:, k] < q)
             down = (x == 1) & (u[:, k] > 1 - back)
@@ -119,9 +131,10 @@ def gap(p):
 
     g = min(range(2, 2 * steps, 2), key=lambda g: abs(np.log(meets(g) / p)))
 
-    def path(z, u):
+    def path(draw, n):
+        u = draw(UNIFORM)
         moves = np.where(u < 0.25, -2, np.where(u < 0.5, 2, 0))
-        return np.concatenate([np.full((len(u), 1), g), g + np.cumsum(moves, axis=1)], axis=1) - 1.0
+        return np.concatenate([np.full((n, 1), g), g + np.cumsum(moves, axis=1)], axis=1) - 1.0
 
     return playing(path, steps), float(meets(g))
 

@@ -6,6 +6,8 @@ import time
 
 import numpy as np
 import pytest
+from aiohttp import ClientConnectionResetError
+from aiohttp.web import WebSocketResponse
 from page_client import PageClient
 from recorded_games import hunt
 from watched_plugins import failing
@@ -192,6 +194,25 @@ def test_a_page_that_ends_leaves_no_thread_and_no_port():
         client.wait(lambda: threading.active_count() <= before)
         with pytest.raises(OSError, match="Cannot connect"):
             PageClient(page.url)
+
+
+@pytest.mark.parametrize("way", ["send_str", "send_bytes"])
+def test_a_browser_that_goes_while_it_is_sent_something_is_no_error_of_the_page(game, monkeypatch, way):
+    """As aiohttp says it; which message is under way at that moment is chance."""
+    live, page, _ = game
+    sent = threading.Event()
+
+    async def gone(socket, data):
+        sent.set()
+        raise ClientConnectionResetError("Cannot write to closing transport")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(WebSocketResponse, way, gone)
+        live.step(5)
+        assert sent.wait(60.0)
+    with PageClient(page.url) as other:
+        other.wait(lambda: other.t == pytest.approx(0.5))
+        assert not other.status["notes"]
 
 
 def test_the_header_of_a_message_leaves_its_numbers_on_whole_words():

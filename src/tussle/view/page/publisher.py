@@ -199,11 +199,14 @@ class FramePublisher:
             while True:
                 await reader.wake.wait()
                 reader.wake.clear()
+                texts: list[
+                    str
+                ] = []  # sent outside `caught`: that a browser has gone is no failure of the page
                 if time.monotonic() >= reader.status_due:
                     reader.status_due = time.monotonic() + STATUS_PERIOD
                     with self._failures.caught():
-                        text = json.dumps(self._status(reader))
-                        await socket.send_str(text)
+                        texts.append(json.dumps(self._status(reader)))
+                await _send_all(socket, texts)
                 while reader.past:
                     await socket.send_bytes(reader.past.popleft())
                 if reader.drawn_sent != self._n_drawn:
@@ -212,7 +215,8 @@ class FramePublisher:
                 # Before the frame: the page has the counts of what it shows.
                 with self._failures.caught():
                     if curves := self._new_curves(reader):
-                        await socket.send_str(json.dumps(curves))
+                        texts.append(json.dumps(curves))
+                await _send_all(socket, texts)
                 if reader.frame_sent != self.n_made:
                     reader.frame_sent = self.n_made
                     await socket.send_bytes(self._frame)
@@ -333,3 +337,8 @@ class FramePublisher:
         past = [frames[step] for step in sorted(frames)]
         header = {"kind": "past", "epoch": live.epoch, "seconds": seconds}
         reader.past.append(message(header, pack(past[0].step, past, self._step)))
+
+
+async def _send_all(socket: WebSocketResponse, texts: list[str]) -> None:
+    while texts:
+        await socket.send_str(texts.pop(0))
