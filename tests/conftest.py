@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import os
+import signal
 import socket
 import subprocess
 import sys
@@ -23,6 +24,12 @@ settings.load_profile("untimed")
 def pytest_xdist_auto_num_workers() -> int:
     """One more than cores, since many tests wait; each further one imports and collects everything, for 20 s of CPU time."""
     return (os.cpu_count() or 1) + 1
+
+
+def pytest_configure() -> None:
+    """Ctrl-C reaches the processes that tests start, even where these run in the background of a shell, which lets it be ignored."""
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @pytest.hookimpl(wrapper=True)

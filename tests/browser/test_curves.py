@@ -81,7 +81,7 @@ def test_the_numbers_of_a_live_game_are_what_tussle_run_prints_at_that_step(chro
                 alone.step(step)
                 result = alone.result()[0]
             watched.wait(
-                f"document.querySelector('#metrics').innerText.includes('{result.metrics['Share']['gone']:,.4g}')"
+                f"document.querySelector('#metrics').textContent.includes('Share gone{result.metrics['Share']['gone']:,.4g}')"
             )
             assert [row.split() for row in text(watched, "#teams .team > span:nth-of-type(2)")] == [
                 [str(result.alive[team]), "/", str(result.born[team])] for team in (1, 2)

@@ -32,8 +32,9 @@ window.show = () => { window.leave = render({ model, el: document.getElementById
 class Notebook:
     """A page that shows a widget as a notebook does: what the one sends, the other gets."""
 
-    def __init__(self, page, widget):
-        self.page, self.widget, self.sent = page, widget, []
+    def __init__(self, page, view):
+        self.page, self.widget, self.sent = page, view.widget, []
+        widget = view.widget
         self.is_kernel_there = True
         widget.send = lambda content, buffers=None: self.sent.append((content, list(buffers or [])))
         page.expose_function("kernel", self._receive)
@@ -44,7 +45,7 @@ class Notebook:
 
     def _receive(self, text):
         if self.is_kernel_there:
-            self.widget._receive(self.widget, json.loads(text), [])
+            self.widget._handle_custom_msg(json.loads(text), [])
 
     def until(self, condition, seconds=60.0):
         for _ in range(int(seconds / 0.02)):
@@ -89,15 +90,16 @@ def test_a_large_run_asks_the_kernel_for_what_it_shows(folder, watched, monkeypa
     notebook = Notebook(watched("nothing"), load_run(folder).view())
     assert len(notebook.widget.html) < 400_000
     notebook.wait(f"player.isReady && player.ids.length === {len(Recording(folder).frame(0))}")
-    notebook.widget._receive(None, {"do": "blob", "view": "other", "name": "nothing"}, [])
+    notebook.widget._handle_custom_msg({"do": "blob", "view": "other", "name": "nothing"}, [])
     assert notebook.sent[-1][0]["error"] == "There is nothing of this name."
 
 
 def test_a_simulation_is_played_in_its_cell(watched):
     pytest.importorskip("anywidget")
     with Simulation(hunt(n_prey=6, end=60.0), 3) as simulation:
-        notebook = Notebook(watched("nothing"), simulation.view())
-        live = notebook.widget.live
+        view = simulation.view()
+        notebook = Notebook(watched("nothing"), view)
+        live = view.live
         notebook.wait(f"player.isReady && player.t === 0 && player.ids.length === {len(live.frame())}")
         notebook.frame.get_by_role("button", name="Play", exact=True).first.click()
         notebook.until(lambda: live.step_number > 3)
@@ -112,9 +114,9 @@ def test_a_simulation_is_played_in_its_cell(watched):
         assert "run the cell again" in gone.inner_text()
         notebook.is_kernel_there = True
         notebook.page.evaluate("() => window.leave()")
-        notebook.until(lambda: not notebook.widget._cells)
-        notebook.widget.stop()
-        notebook.widget.stop()
+        notebook.until(lambda: not view._cells)
+        view.stop()
+        view.stop()
 
 
 def test_without_anywidget_the_extra_is_named(monkeypatch):

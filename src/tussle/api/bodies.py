@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,6 +11,7 @@ import numpy as np
 from tussle.api import kernels
 from tussle.errors import listed, nearest_name
 from tussle.numeric.neighbors.index import Index, Split, padded
+from tussle.numeric.neighbors.kernels import update
 from tussle.world.rays.bodies import BodyTree
 
 FLOATS = {
@@ -242,6 +244,53 @@ class Bodies:
         self._newest = kept
         return kept.columns[0]  # type: ignore[no-any-return]
 
+    def chained(self, kept: CachedArrays, names: Sequence[str]) -> list[tuple[Any, ...]]:
+        """The kernels that put columns by place of the index of `laid_out`, with their arguments, valid until the next `replace`."""
+        index, values = kept.columns[0], self._values
+        return [
+            c for k in names for c in putting(k, values(k), index.place, index.columns[k].columns, 0, self.n)
+        ]
+
+    def has_chained(self, kept: CachedArrays, names: Sequence[str]) -> None:
+        """Note that the kernels of an index and of `chained` have run for the current positions."""
+        self._newest, kept.version = kept, self.version
+        index = kept.columns[0]
+        for name in names:
+            column = index.columns[name]
+            column.version, column.built = self.version, index.built
+
+    def moved(self, kept: CachedArrays, names: Sequence[str]) -> list[tuple[Any, ...]]:
+        """As `chained`, for rows that move: the kernels take a range of rows; with the place of its first argument before each."""
+        index, _, *pos = kept.columns
+        calls: list[tuple[Any, ...]] = [(0, update, 0, self.n, *pos, index.place, index.points)]
+        for name in names:
+            if name in DERIVED and name != "level_forward":
+                calls.append((1, _DERIVING[name], self.quat, 0, self.n, 0, self.derived(name)))
+            put = putting(name, self._values(name), index.place, index.columns[name].columns, 0, self.n)
+            calls += [(1, *call) for call in put]
+        return calls
+
+    def rows_moved(self, kept: CachedArrays, names: Sequence[str]) -> tuple[int, int] | None:
+        """The only range of rows that has changed since an index and columns by its places were current; None if there is no such one."""
+        columns, version = kept.columns[0].columns, kept.version
+        for name in names:
+            if columns[name].version != version or (
+                name in self._derived and self._derived[name].version != version
+            ):
+                return None
+        ranges = self._since(version)
+        return ranges[0] if len(ranges) == 1 else None
+
+    def has_moved(self, kept: CachedArrays, names: Sequence[str]) -> None:
+        """Note that the kernels of `moved` have run."""
+        version = self.version
+        self._newest, kept.version = kept, version
+        columns = kept.columns[0].columns
+        for name in names:
+            columns[name].version = version
+            if name in self._derived:
+                self._derived[name].version = version
+
     def tree(self, boxes: np.ndarray) -> BodyTree:
         """Tree over the current bodies, for rays; boxes: lengths by block [m], (n_blocks, 3), 0 for spheres."""
         if self._tree is None or self._tree[0] != self.version:
@@ -262,10 +311,7 @@ class Bodies:
         is_current = name in INTS or (kept.version == self.version and name not in IN_PLACE)
         if kept.built == index.built and is_current:
             return kept.columns  # type: ignore[no-any-return]
-        if name == "level_forward":
-            values = self.quat  # computed on the way to the places
-        else:
-            values = self.derived(name) if name in DERIVED else getattr(self, name)
+        values = self._values(name)
         if split is not None and kept.built != index.built:
             split(self.n, lambda *part: put_by_place(name, values, index.place, kept.columns, *part))
         else:
@@ -274,6 +320,12 @@ class Bodies:
                 put_by_place(name, values, index.place, kept.columns, *part)
         kept.version, kept.built = self.version, index.built
         return kept.columns  # type: ignore[no-any-return]
+
+    def _values(self, name: str) -> np.ndarray:
+        """A column as `putting` takes it."""
+        if name == "level_forward":
+            return self.quat  # computed on the way to the places
+        return self.derived(name) if name in DERIVED else getattr(self, name)
 
     def keep_start(self) -> None:
         """Let the current positions decide who is in range of whom until `end_start`."""
@@ -320,13 +372,20 @@ def put_by_place(
     name: str, values: np.ndarray, place: np.ndarray, columns: tuple[np.ndarray, ...], first: int, last: int
 ) -> None:
     """Write the values of rows [first, last) to columns by place; for level_forward, `values` are quaternions (4, n)."""
+    for run, *arguments in putting(name, values, place, columns, first, last):
+        run(*arguments)
+
+
+def putting(
+    name: str, values: np.ndarray, place: np.ndarray, columns: tuple[np.ndarray, ...], first: int, last: int
+) -> list[tuple[Any, ...]]:
+    """The kernels of `put_by_place`, with their arguments."""
     if name == "level_forward":
-        kernels.level_forward_by_place(values, first, last, place, *columns)
-    elif name in INTS:
-        kernels.ints_by_place(values, first, last, place, columns[0])
-    else:
-        for column, source in zip(columns, np.atleast_2d(values), strict=True):
-            kernels.floats_by_place(source, first, last, place, column)
+        return [(kernels.level_forward_by_place, values, first, last, place, *columns)]
+    if name in INTS:
+        return [(kernels.ints_by_place, values, first, last, place, columns[0])]
+    sources = zip(columns, np.atleast_2d(values), strict=True)
+    return [(kernels.floats_by_place, source, first, last, place, column) for column, source in sources]
 
 
 def derive(name: str, quat: np.ndarray, first: int, last: int, base: int, out: np.ndarray) -> None:

@@ -10,3 +10,19 @@ CHANNEL_UNITS = {
 
 DRIVEN_CHANNELS = CHANNEL_UNITS | {f"motor_{i}": "rad/s" for i in range(8)}
 """The same with the motors of a multirotor, for plugins that drive actuators."""
+
+COMMAND_CHANNELS = DRIVEN_CHANNELS | {
+    "desired_pitch": "rad", "steering": "rad", "x_thrust": "m/s^2", "y_thrust": "m/s^2", "z_thrust": "m/s^2", "turn_force": "rad/s^2",
+}  # fmt: skip
+"""All numbers that motion models and controllers that ship read."""
+
+_AXES = "xyz"
+MEASURED_CHANNELS = {
+    **{f"belief_pos_{i}": "m" for i in _AXES}, **{f"belief_vel_{i}": "m/s" for i in _AXES}, **{f"belief_quat_{i}": "" for i in "wxyz"},
+    **{f"measured_pos_{i}": "m" for i in _AXES}, **{f"body_velocity_{i}": "m/s" for i in _AXES},
+    **{f"body_rate_{i}": "rad/s" for i in _AXES}, **{f"body_acceleration_{i}": "m/s^2" for i in _AXES},
+    **{f"body_rate_change_{i}": "rad/s^2" for i in _AXES}, "true_altitude_above_terrain": "m", "altitude_above_terrain": "m",
+    "gps_latitude": "rad", "gps_longitude": "rad", "gps_altitude": "m", "gps_fix": "", "gps_time": "s", "los_range": "m", "los_sd": "m",
+    "is_in_range": "", "ins_cep": "m", "n_seen": "", "n_contacts": "",
+}  # fmt: skip
+"""All numbers that sensors that ship write."""

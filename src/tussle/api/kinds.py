@@ -80,6 +80,8 @@ class Sensor(EntityPlugin):
     """
 
     kind = "sensor"
+    alters_sensors: ClassVar[bool] = False
+    """Return True if the outputs are channels that sensors before it have written, and that it alters."""
 
 
 class WorldPlugin(Plugin):

@@ -10,10 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from tussle.api.bodies import DERIVED, FLOATS, INTS, Bodies
+from tussle.api.bodies import DERIVED, FLOATS, IN_PLACE, INTS, Bodies, CachedArrays
 from tussle.api.group import GroupView
 from tussle.declare.columns import Channel, Numbers, Param
 from tussle.errors import DeclarationError, listed, nearest_name
+from tussle.numeric.kernel import Kernel, is_interpreted
+from tussle.numeric.neighbors.chain import Chain, TurnChain
 from tussle.numeric.neighbors.index import Blocks, Index
 from tussle.numeric.neighbors.law import OTHER, PAIR, Law
 from tussle.numeric.neighbors.walk import make_walk
@@ -219,6 +221,29 @@ def own_columns(cls: Any) -> dict[str, str]:
     return found
 
 
+MIN_USES = 12
+"""A chain is made when rows have stayed the same for so many steps: to pack its arguments takes as long as ten steps save."""
+
+
+@dataclass(slots=True, eq=False)
+class Gathered:
+    """What a pair loop takes while rows and parameters stay the same.
+
+    Attributes:
+        laid_out: The index and its arrays.
+        blocks: Blocks of the rows.
+        arrays: Arguments of the kernel.
+        uses: Number of steps.
+        chain: All kernels in one call, for positions that have changed: a `Chain`, or a `TurnChain` where entities move one after another.
+    """
+
+    laid_out: CachedArrays
+    blocks: Blocks
+    arrays: tuple[Any, ...]
+    uses: int = 0
+    chain: Any = None
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class WalkPlan:
     """Kernel of a pair loop and the columns of a plugin that it takes.
@@ -234,6 +259,7 @@ class WalkPlan:
         lists: The kernel returns one value per pair instead of one per row.
         moving: Columns of the neighbours that change when an entity moves.
         keeps: The columns by row are arrays that stay the same until the rows change.
+        placed: Names of `other`.
     """
 
     run: Callable[..., Any]
@@ -246,9 +272,16 @@ class WalkPlan:
     lists: bool
     moving: tuple[str, ...]
     keeps: bool
+    placed: tuple[str, ...]
 
     def walk(self, plugin: Any, g: GroupView) -> Contributions:
         """Return the contributions of the neighbours of each row."""
+        kept = g.kept.get((id(self), id(plugin)))
+        if kept is not None and kept.chain is not None and kept.laid_out.version != g._bodies.version:
+            chained = self._walk_in_turn if g._bodies.scans else self._walk_at_once
+            out = chained(g._bodies, kept)
+            if out is not None:
+                return Contributions(self.names, out)
         blocks, arrays = self.gather(plugin, g)
         run = self.run_single if g._bodies.scans else self.run
         if self.lists:
@@ -267,19 +300,26 @@ class WalkPlan:
         share = None if split is None else g.context.split
         kept = g.kept.get(key)
         if kept is not None and self.is_constant:
-            laid_out = kept[0]
+            laid_out = kept.laid_out
         else:
             laid_out = bodies.laid_out(g.reach(self.radius(g, plugin.__dict__), self.is_constant))
         index = bodies.refreshed(laid_out, split)
-        if kept is not None and kept[0] is laid_out:
-            _, blocks, arrays = kept
+        if kept is not None and kept.laid_out is laid_out:
+            blocks, arrays = kept.blocks, kept.arrays
             if bodies.scans:  # each row has its whole world as candidates
                 for name in self.moving:
                     bodies.by_place(index, name, split)
-                return blocks, self._with_points(bodies, index, blocks, arrays)
+                arrays = self._with_points(bodies, index, blocks, arrays)
+                kept.uses += 1
+                if kept.uses == MIN_USES and split is None:
+                    kept.chain = self._turns(g, kept, arrays)
+                return blocks, arrays
             if index.blocks(g.first, g.last, share).spans is arrays[0][1]:
                 for name, _ in self.other:
                     bodies.by_place(index, name, split)
+                kept.uses += 1
+                if kept.uses == MIN_USES and split is None:
+                    kept.chain = self._chain(g, kept)
                 return blocks, arrays
         blocks = index.blocks(g.first, g.last, share)
         others: tuple[np.ndarray, ...] = ()
@@ -289,8 +329,50 @@ class WalkPlan:
         own = self.own(g, plugin.__dict__)
         arrays = (blocks.cuts, blocks.spans, index.order), (blocks.points, index.points), others, own
         if self.keeps:
-            g.kept[key] = laid_out, blocks, arrays
+            g.kept[key] = Gathered(laid_out, blocks, arrays)
         return blocks, self._with_points(bodies, index, blocks, arrays) if bodies.scans else arrays
+
+    def _chain(self, g: GroupView, kept: Gathered) -> Chain | None:
+        """The kernels of `walk` as one call; None for laws that run as Python, and where blocks do not change."""
+        index, _, *pos = kept.laid_out.columns
+        is_general = self.is_constant and not self.lists and not index.is_fixed
+        if not (is_general and isinstance(self.run, Kernel)) or is_interpreted(self.run.py_func):
+            return None
+        columns = g._bodies.chained(kept.laid_out, self.placed)
+        rows = g.first, g.last
+        return Chain(index, tuple(pos), kept.blocks, rows, columns, self.run, kept.arrays, len(self.names))
+
+    def _turns(self, g: GroupView, kept: Gathered, arrays: tuple[Any, ...]) -> TurnChain | None:
+        """As `_chain`, where entities move one after another; None also for columns that are written in place."""
+        run, blocks = self.run_single, kept.blocks
+        if self.lists or not isinstance(run, Kernel) or is_interpreted(run.py_func):
+            return None
+        if set(self.moving) & set(IN_PLACE):
+            return None
+        moved = g._bodies.moved(kept.laid_out, self.moving)
+        return TurnChain(moved, run, arrays, (g.first, g.last), blocks, len(self.names))
+
+    def _walk_in_turn(self, bodies: Bodies, kept: Gathered) -> np.ndarray | None:
+        """The contributions after one range of rows has moved; None if there was more."""
+        chain, laid_out = kept.chain, kept.laid_out
+        rows = bodies.rows_moved(laid_out, self.moving)
+        if rows is None or bodies.range_points(laid_out.columns[0]) is not chain.points:
+            return None
+        out: np.ndarray = chain.run(rows)
+        bodies.has_moved(laid_out, self.moving)
+        return out
+
+    def _walk_at_once(self, bodies: Bodies, kept: Gathered) -> np.ndarray | None:
+        """The contributions for positions that have changed; None if there is no room for the spans of the blocks."""
+        chain = kept.chain
+        if chain.spans is not kept.blocks.spans:
+            return None
+        for name in self.placed:
+            if name in DERIVED and name != "level_forward":
+                bodies.derived(name)  # computed in place
+        out: np.ndarray | None = chain.run()
+        bodies.has_chained(kept.laid_out, self.placed)
+        return out
 
     def _with_points(
         self, bodies: Bodies, index: Index, blocks: Blocks, arrays: tuple[Any, ...]
@@ -357,4 +439,5 @@ def make_plan(g: GroupView, plugin: Any, declared: NeighborLaw) -> WalkPlan:
         laws[0].lists,
         tuple(name for name in other if name not in INTS),
         "column(" not in by_row and "g.world" not in by_row,
+        tuple(other),
     )

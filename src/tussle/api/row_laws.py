@@ -193,10 +193,8 @@ class Rows:
         both = [each for each in first if each in written]
         self.given = [*(each for each in first if each not in written), *both]
         self.kept = [*both, *(each for each in written if each not in both)]
-        bodies = dict.fromkeys(
-            BODY[str(each.key)][0] for each in self.given if not isinstance(each.key, tuple)
-        )
-        self.derived = [name for name in bodies if name in DERIVED]
+        bodies = {BODY[str(each.key)][0] for each in self.given if not isinstance(each.key, tuple)}
+        self.derived = sorted(bodies & DERIVED.keys())
         codes = f"({' '.join('F' * len(self.given))}) ({' '.join(['Fw'] * len(self.kept))})"
         further, names = more
         arguments = f"own, out, dt, substeps, {names}part"
@@ -225,12 +223,10 @@ class Rows:
             name, place = BODY[str(number.key)]
             return np.asarray(np.atleast_2d(g.column(name))[place])
 
-        given, kept = list(map(column, self.given)), list(map(column, self.kept))
-        arrays = (
-            tuple(np.asarray(each, float) for each in given),
-            tuple(np.asarray(each, float) for each in kept),
-        )
-        if all(each.dtype == float for each in (*given, *kept)):
+        columns = [*map(column, self.given), *map(column, self.kept)]
+        floats, n = tuple(np.asarray(each, float) for each in columns), len(self.given)
+        arrays = floats[:n], floats[n:]
+        if all(a is b for a, b in zip(columns, floats, strict=True)):
             g.kept[self] = arrays
         return arrays
 

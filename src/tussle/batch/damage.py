@@ -27,7 +27,7 @@ def damage_in_batch(path: str | Path) -> tuple[list[str], list[str]]:
     try:
         info = store.read_info(place)
         damage += store.damage(place, info)
-        for name in (store.DESIGN_FILE, store.RESULTS_FILE, store.ALIVE_FILE):
+        for name in store.TABLES:
             file = place / name
             if file.exists() and not damage:
                 with file.open("rb") as opened:

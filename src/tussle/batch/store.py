@@ -80,6 +80,9 @@ ALIVE = pa.schema([("run", pa.int64()), ("team", pa.int32()), ("t", pa.float64()
 DESIGN = pa.schema([("run", pa.int64()), ("point", pa.int32()), ("seed", pa.uint64())])
 """One row per planned run; a column for each variable follows."""
 
+TABLES = {DESIGN_FILE: DESIGN, RESULTS_FILE: RESULTS, ALIVE_FILE: ALIVE}
+"""Files of a complete batch, and their columns."""
+
 
 @dataclass
 class StoredBatch:
@@ -379,17 +382,15 @@ def load(path: str | Path) -> StoredBatch:
     """
     path = Path(path)
     info = read_info(path)
-    lacking: list[str] = []
+    needed = TABLES if info["is_complete"] else (DESIGN_FILE,)
+    lacking = [f"{name} is missing" for name in needed if not (path / name).exists()]
     design = read_table(path, DESIGN_FILE, DESIGN, lacking)
     if design is None or lacking:
-        what = lacking[0] if lacking else f"{DESIGN_FILE} is not there"
         raise BatchError(
-            f"{path}: {what}; the command of the batch writes it again, and keeps the finished runs"
+            f"{path}: {lacking[0]}; the command of the batch writes it again, and plays only runs that are lost"
         )
     check_design(design, info, path / DESIGN_FILE)
     played, notes = read_played(path)
-    if info["is_complete"] and not (path / RESULTS_FILE).exists():
-        raise BatchError(f"{path}: {RESULTS_FILE} is missing; the command of the batch plays its runs again")
     results, alive = merged(path, played, design, notes)
     n = len(pc.unique(results["run"]))
     if not info["is_complete"]:
@@ -408,7 +409,7 @@ def damage(path: Path, info: dict[str, Any]) -> list[str]:
         BatchError: A table is another one.
     """
     notes: list[str] = []
-    for name, columns in ((DESIGN_FILE, DESIGN), (RESULTS_FILE, RESULTS), (ALIVE_FILE, ALIVE)):
+    for name, columns in TABLES.items():
         if read_table(path, name, columns, notes) is None and info["is_complete"]:
             notes.append(f"{name} is missing")
     return notes

@@ -198,6 +198,10 @@ class StressOptions(PoolOptions):
         bool,
         flag("--why", "Show from which moment on the worst failing game was lost, by branches of it."),
     ] = False
+    shrink: Annotated[
+        bool,
+        flag("--shrink", "Make the worst failing game as small as it can be, as failures/smallest.xml."),
+    ] = False
     particles: Annotated[
         int,
         option("N", "With --probability: games at a time, of each repetition.", min=2, shows_default=True),
@@ -214,8 +218,26 @@ class StressOptions(PoolOptions):
         ),
     ] = None
 
+    holds: Annotated[
+        float | None,
+        option(
+            "P",
+            "End with exit code 6 unless the specification holds with 95 % confidence above this probability: 0.999.",
+        ),
+    ] = None
+    junit: Annotated[
+        Path | None,
+        option("FILE", "With --holds: write the answer as JUnit XML, for programs that run checks."),
+    ] = None
+
     def __post_init__(self) -> None:
         super().__post_init__()
+        if self.holds is not None and not 0.0 <= self.holds < 1.0:
+            raise typer.BadParameter(
+                f"--holds {self.holds:g} is not allowed; it takes a probability from 0 to less than 1"
+            )
+        if self.junit is not None and self.holds is None:
+            raise typer.BadParameter("--junit needs --holds: the probability above which the test passes")
         if not self.spec:
             raise typer.BadParameter(
                 "--spec is missing: what must hold, such as 'always (distance(team 1, team 1) > 2 m)'"

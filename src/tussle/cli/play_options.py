@@ -227,6 +227,9 @@ class ViewOptions(AgainOptions, PageOptions):
         Path | None, option("DIR", "Record the game into this directory, as tussle run does.")
     ] = None
     record_columns: Annotated[str | None, columns_option()] = None
+    roles: Annotated[
+        bool, flag("--roles", "Print further addresses: for watching only, and for orders to one team.")
+    ] = False
     exit_when_over: Annotated[bool, flag("--exit-when-over", "End with the game, not only by Ctrl-C.")] = (
         False
     )

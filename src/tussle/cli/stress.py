@@ -11,15 +11,20 @@ from typing import Any
 import numpy as np
 
 from tussle.batch.statistics import scipy_package
+from tussle.batch.store import reported
 from tussle.cli.batch import command_line
 from tussle.cli.batch_options import StressOptions
 from tussle.cli.interrupt import Interrupt, Interrupted
 from tussle.cli.options import show_notes
 from tussle.cli.progress import ProgressMeter, compiling
 from tussle.cli.tables import fact_list, number_tables, title
-from tussle.cli.terminal import OK, put, say, say_note
+from tussle.cli.terminal import DOES_NOT_HOLD, OK, put, say, say_note
+from tussle.mission import Mission, to_xml
+from tussle.record.run_file import put_whole
 from tussle.stress.chances import Chance
+from tussle.stress.confidence import Assurance, junit_xml
 from tussle.stress.games import Played
+from tussle.stress.shrink import SmallestGame
 from tussle.stress.study import FAILURES, MAX_FAILURES, Probability, Sample, Stress
 
 MAX_SHOWN = 5
@@ -82,7 +87,28 @@ def stress(options: StressOptions) -> int:
         show_sample(sample, study, directory, options)
     if lost:
         show_chances(lost, study)
-    return OK
+    if options.shrink and failures:
+        show_smallest(study.smallest(failures[0]), study, directory, options)
+    if options.holds is None:
+        return OK
+    return judge(found if options.probability else sample, study, directory, options)
+
+
+def judge(found: Sample | Probability, study: Stress, directory: Path, options: StressOptions) -> int:
+    """Say whether the specification holds as it is asked to, write that as JUnit XML, and return the exit code."""
+    asked, assurance = float(options.holds or 0.0), Assurance.of(found)
+    if options.junit is not None:
+        files = [
+            str(directory / FAILURES / f"{i}.xml") for i in range(min(len(found.failures), MAX_FAILURES))
+        ]
+        with reported(options.junit):
+            options.junit.parent.mkdir(parents=True, exist_ok=True)
+            put_whole(
+                options.junit,
+                junit_xml(study.batch.name, str(study.specification), assurance, asked, files),
+            )
+    put("", f" {assurance.sentence(asked)}")
+    return OK if assurance.least > asked else DOES_NOT_HOLD
 
 
 def show_sample(sample: Sample, study: Stress, directory: Path, options: StressOptions) -> None:
@@ -174,6 +200,46 @@ def show_chances(lost: list[Chance], study: Stress) -> None:
     put(
         f" of {lost[0].n} branches of {FAILURES}/0.xml from each moment, with other luck; in parentheses: 95 % intervals"
     )
+
+
+def show_smallest(found: SmallestGame, study: Stress, directory: Path, options: StressOptions) -> None:
+    """Write the smallest failing game, and show how much smaller it is."""
+    path = directory / FAILURES / "smallest.xml"
+    with reported(directory):
+        put_whole(path, to_xml(found.mission, found.seed))
+    rows = [
+        (
+            "",
+            [
+                name,
+                *(
+                    str(part(mission))
+                    for part in (
+                        n_entities,
+                        lambda m: len(m.blocks),
+                        n_plugins,
+                        lambda m: f"{m.end - m.start:.6g}",
+                    )
+                ),
+            ],
+        )
+        for name, mission in (("mission", study.mission), (f"{FAILURES}/{path.name}", found.mission))
+    ]
+    put(*number_tables(["game", "entities", "blocks", "plugins", "length [s]"], rows))
+    end = "no part of it can be left out" if found.is_smallest else "more could be left out"
+    put(f" robustness {found.robustness:.6g}; {found.n_games} games were played, {end}")
+    files = "".join(f" --plugin-path {shlex.quote(str(p))}" for p in options.plugin_files)
+    put("", f" tussle run {shlex.quote(str(path))}{files}")
+
+
+def n_entities(mission: Mission) -> int:
+    """Number of entities of all blocks."""
+    return sum(block.count for block in mission.blocks)
+
+
+def n_plugins(mission: Mission) -> int:
+    """Number of plugins of the world and of all blocks."""
+    return len(mission.world_plugins) + sum(len(block.plugins) for block in mission.blocks)
 
 
 def share(value: float, low: float, high: float) -> str:

@@ -21,7 +21,16 @@ from tussle.errors import BatchError, PluginError, RecordError, TussleError, vis
 WIDEST = 100
 """Largest width of tables and bars, in characters."""
 
-OK, WRONG_INPUT, USAGE, PLUGIN_FAILED, NOT_WRITTEN, RUNS_FAILED, OWN_FAULT = 0, 1, 2, 3, 4, 5, 70
+OK, WRONG_INPUT, USAGE, PLUGIN_FAILED, NOT_WRITTEN, RUNS_FAILED, DOES_NOT_HOLD, OWN_FAULT = (
+    0,
+    1,
+    2,
+    3,
+    4,
+    5,
+    6,
+    70,
+)
 INTERRUPTED, TERMINATED = 130, 143
 
 MAX_LINE = 4000
@@ -34,6 +43,7 @@ EXIT_CODES = {
     PLUGIN_FAILED: "a plugin failed during the game",
     NOT_WRITTEN: "a run or batch directory cannot be written or read",
     RUNS_FAILED: "some runs of a batch failed; its tables hold the others",
+    DOES_NOT_HOLD: "a specification does not hold as --holds asks",
     OWN_FAULT: "internal error of tussle: a bug, please report it",
     INTERRUPTED: "interrupted by Ctrl-C; results so far are kept",
     TERMINATED: "terminated by SIGTERM; results so far are kept",

@@ -61,7 +61,7 @@ def view(options: ViewOptions) -> int:
             inputs=() if planned is None else planned.inputs,
         )
         stack.callback(live.stop)
-        page = stack.enter_context(Page(live, host=options.host, port=options.port))
+        page = stack.enter_context(Page(live, host=options.host, port=options.port, has_roles=options.roles))
         announce(page, options)
         speed = Speed(began)
         speed.begin(float(simulation.t[0]))
@@ -115,6 +115,8 @@ def announce(page: Page, options: PageOptions) -> None:
     for note in page.notes:
         say_note(note)
     out().print(f"{page.game.name}: {page.url}  (Ctrl-C ends it)", soft_wrap=True)
+    for role, url in list(page.addresses.items())[1:]:
+        out().print(f" {role}: {url}", soft_wrap=True)
     if not page.is_local:
         say(
             "warning",

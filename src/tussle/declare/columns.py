@@ -453,11 +453,14 @@ class Handle(Column):
         max_worlds: Largest stack of worlds that the objects allow; None for no limit.
         ready_timeout: Longest wait for `ready` [s of wall time].
         doc: One-line description.
+        is_text: In a message: the object is a text, which a user can type.
     """
 
-    def __init__(self, max_worlds: int | None = None, ready_timeout: float = 10.0, doc: str = "") -> None:
+    def __init__(
+        self, max_worlds: int | None = None, ready_timeout: float = 10.0, doc: str = "", is_text: bool = False
+    ) -> None:
         super().__init__(doc=doc)
-        self.max_worlds, self.ready_timeout = max_worlds, ready_timeout
+        self.max_worlds, self.ready_timeout, self.is_text = max_worlds, ready_timeout, is_text
 
     @staticmethod
     def most_worlds(plugin: Any) -> int | None:
@@ -494,12 +497,22 @@ class Children(Column):
 
 
 class Field(Numbers):
-    """A field of a message type; with `ragged` a list of items, (k, m) or (m,) per message."""
+    """A field of a message type; with `ragged` a list of items, (k, m) or (m,) per message.
+
+    `example` has the values with which a form for the message begins; by default zeros.
+    """
 
     def __init__(
-        self, fields: str = "", unit: str = "", dtype: type = float, ragged: bool = False, doc: str = ""
+        self,
+        fields: str = "",
+        unit: str = "",
+        dtype: type = float,
+        ragged: bool = False,
+        doc: str = "",
+        example: tuple[float, ...] = (),
     ) -> None:
         super().__init__(fields, unit, dtype, doc, ragged)
+        self.example = example
         self.default = 0
 
 

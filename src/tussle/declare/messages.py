@@ -313,7 +313,7 @@ class RewardGiven(Message):
 class TextMessage(Message):
     """A text, such as the name of a state on the topic `State`, or of an event on the topic `Event`."""
 
-    text = Handle(doc="The text.")
+    text = Handle(doc="The text.", is_text=True)
     to = EntityRef(doc="Entity that it is for; none if it is for all that receive it.")
 
 
@@ -348,6 +348,7 @@ class WaypointList(Message):
         unit="m m m rad rad rad m rad",
         ragged=True,
         doc="Positions and attitudes in the world frame, and tolerances.",
+        example=(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 10.0, 0.5),
     )
     mode = Field(dtype=int, doc="Index into WAYPOINT_MODES.")
 
@@ -394,20 +395,20 @@ class WorldPointClicked(Message):
 class CustomKeyPress(Message):
     """A user of the viewer pressed the key that is reserved for plugins; sender is 0."""
 
-    key = Handle(doc="Name of the key.")
+    key = Handle(doc="Name of the key.", is_text=True)
 
 
 class RemoveEntity(Message):
     """Request the removal of an entity; it is removed at the end of the step."""
 
     entity = EntityRef(doc="Entity that is removed.")
-    why = Handle(doc="Cause of its death, for the events.")
+    why = Handle(doc="Cause of its death, for the events.", is_text=True)
 
 
 class SpawnEntity(Message):
     """Request a new entity of a block; it appears at the beginning of the next step."""
 
-    block = Handle(doc="Name of the template block.")
+    block = Handle(doc="Name of the template block.", is_text=True)
     pos = Field("x y z", unit="m m m")
     vel = Field("vx vy vz", unit="m/s m/s m/s")
     quat = Field("w qx qy qz")

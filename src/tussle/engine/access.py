@@ -175,7 +175,7 @@ def write(state: SimulationState, path: str, values: Any, world: int | None = No
             target[..., rows[mine]] = part
             bodies.has_loads = True
             bodies.touch(group.first, group.last)
-            if name in ("pos", "vel", "quat") and differs.any():
+            if name in ("pos", "vel", "quat", "omega") and differs.any():
                 group.motion_view.begin(group.motion.plugin)
                 group.motion.plugin.from_body(group.motion_view, mine[differs])
         else:

@@ -12,7 +12,7 @@ from tussle.declare.messages import Messages, RemoveEntity, SpawnEntity
 from tussle.engine import failure
 from tussle.engine.state import SimulationState
 from tussle.engine.world_bindings import WorldBinding
-from tussle.errors import WiringError, listed, nearest_name
+from tussle.errors import ParameterError, WiringError, listed, nearest_name
 
 
 def deliver(state: SimulationState) -> None:
@@ -146,6 +146,43 @@ def _count_links(
         subscribes[first:last] = topic.is_receiver(bodies.n)[links.receiver[first:last]]
     counts += np.bincount(place[subscribes], minlength=counts.size).reshape(counts.shape)
     state.events.links(network.spec.instance_name, bodies.id, links, subscribes)
+
+
+def order(state: SimulationState, topic: TopicBuffer, batch: Messages, ids: tuple[int, ...]) -> None:
+    """Queue messages from outside for some entities of their worlds, which receive them at the end of the step that comes.
+
+    Raises:
+        ParameterError: An entity does not exist in a world, or does not subscribe to the topic.
+    """
+    number, receiver = check_order(state, topic, batch, ids)
+    topic.post(batch, (number, receiver), state.context.clock.step[batch.world])
+
+
+def check_order(
+    state: SimulationState, topic: TopicBuffer, batch: Messages, ids: tuple[int, ...]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return message number and id of the receiver of each copy, (m,), of messages to some entities.
+
+    Raises:
+        ParameterError: An entity does not exist in a world, or does not subscribe to the topic.
+    """
+    bodies = state.population.bodies
+    number, receiver = np.repeat(np.arange(batch.n), len(ids)), np.tile(np.array(ids, np.int64), batch.n)
+    rows = bodies.rows_of(batch.world[number], receiver)
+    for world, who, row in zip(batch.world[number].tolist(), receiver.tolist(), rows.tolist(), strict=True):
+        if row < 0:
+            raise ParameterError(
+                f"publish: receivers = {who} is not allowed; world {world} has no entity {who} now"
+            )
+        if not any(inbox.view.first <= row < inbox.view.last for inbox in topic.inboxes):
+            group = next(g for g in state.population.groups if g.first <= row < g.last)
+            topics = state.message_bus.topics.values()
+            heard = [f"{t.network}/{t.name}" for t in topics if any(i.view in group.views for i in t.inboxes)]
+            raise ParameterError(
+                f"publish: receivers = {who} is not allowed; no plugin of entity {who} subscribes to {topic.network}/{topic.name}"
+                f"{nearest_name(f'{topic.network}/{topic.name}', heard)}; {listed(heard)}"
+            )
+    return number, receiver
 
 
 def _steps(delay: np.ndarray, dt: float) -> np.ndarray:

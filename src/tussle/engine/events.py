@@ -44,6 +44,7 @@ class Listeners:
         is_replaying: True while steps are repeated that have been reported already; listeners are not called.
         on_change: Called when a listener is added or removed.
         traffic: Objects that count messages.
+        taps: Functions called with each topic on which messages were published in a step, also in steps that are repeated.
         inputs: Functions called with the world and each `ExternalInput` from outside.
     """
 
@@ -51,6 +52,7 @@ class Listeners:
         self.is_replaying = False
         self.on_change: Callable[[], None] = lambda: None
         self.traffic: list[Traffic] = []
+        self.taps: list[Callable[[TopicBuffer], None]] = []
         self.inputs: list[InputListener] = []
         self._context = context
         self._listeners: list[tuple[Callable[[Events], None], frozenset[str]]] = []
@@ -135,6 +137,8 @@ class Listeners:
 
     def published(self, topic: TopicBuffer) -> None:
         """Report the messages of a topic that are published in this step."""
+        for tap in self.taps:
+            tap(topic)
         for counter in () if self.is_replaying else self.traffic:
             worlds = np.bincount(topic.outbox().world, minlength=len(self._context.seeds))
             counter.published(topic.network, topic.name, worlds)

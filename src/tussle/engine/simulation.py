@@ -21,6 +21,7 @@ from tussle.declare.messages import Message, Messages
 from tussle.engine import access
 from tussle.engine.arrivals import reset, spawn_due
 from tussle.engine.calls import Schedule
+from tussle.engine.delivery import order
 from tussle.engine.reseed import branch_keys, renew_keys, set_rekeys
 from tussle.engine.result import WorldResult
 from tussle.engine.rows import place
@@ -276,21 +277,25 @@ class Simulation:
         *,
         network: str = "",
         topic: str = "",
+        receivers: Iterable[int] = (),
         **fields: Any,
     ) -> None:
         """Publish a message between two steps, with the world as sender (sender 0).
 
         World plugins read it in the next step; entities receive it in the step after, like all messages.
 
+        With `receivers`, it is an order to some entities: they receive it then, whatever the network would do with it, and nobody else.
+
         Args:
             type_: Message type.
             worlds: Worlds to publish it in; by default all running worlds. Worlds that have ended are skipped.
             network: Instance name of the network that carries it; by default the network that reaches everyone.
             topic: Name of the topic; by default the name of the type.
+            receivers: Ids of the entities that get it; by default whoever the network reaches.
             **fields: Fields of the message; one value, or one per world along the last axis.
 
         Raises:
-            ParameterError: A world or a field does not exist.
+            ParameterError: A world or a field does not exist, or an entity of `receivers` does not, or it does not subscribe to the topic.
             WiringError: The network does not exist, or the topic has another message type.
         """
         running, message_bus = self.state.running, self.state.message_bus
@@ -301,10 +306,13 @@ class Simulation:
             )
         batch = Messages.make(type_, chosen, np.zeros(len(chosen), np.int64), fields)
         buffer = message_bus.topic(network, topic or type_.__name__, type_, "publish")
-        sent = batch.take(np.flatnonzero(running[chosen]))
-        buffer.add(sent)
+        sent, ids = batch.take(np.flatnonzero(running[chosen])), tuple(map(int, receivers))
+        if ids:
+            order(self.state, buffer, sent, ids)
+        else:
+            buffer.add(sent)
         for number, world in enumerate(sent.world.tolist()) if self._is_told else ():
-            self._tell(world, of_message(sent, number, self._step_of(world), network, topic))
+            self._tell(world, of_message(sent, number, self._step_of(world), network, topic, ids))
 
     @property
     def _is_told(self) -> bool:
@@ -354,7 +362,7 @@ class Simulation:
             return
         type_ = self.state.message_bus.type_of(given.network, given.topic or given.name, given.name)
         fields = fields_of(type_, given.values)
-        self.publish(type_, [world], network=given.network, topic=given.topic, **fields)
+        self.publish(type_, [world], network=given.network, topic=given.topic, receivers=given.to, **fields)
 
     def _play_inputs(self) -> None:
         for world, by_step in self._inputs.items():

@@ -85,10 +85,15 @@ def _sub_group(group: Group, bodies: Bodies, first: int, rows: np.ndarray) -> Gr
 def call_group(
     population: Population, group: Group, worlds: np.ndarray, action: Callable[[Group], None]
 ) -> None:
-    """Call action(group) on a copy of the rows of the worlds where `worlds`, (n_worlds,), is true, then copy the results back."""
+    """Call action(group) on a copy of the rows of the worlds where `worlds`, (n_worlds,), is true, then copy the results back.
+
+    Without any row, as where an entity of these worlds is dead, nothing is called.
+    """
     bodies = population.bodies
     rows = np.flatnonzero(worlds[bodies.world])
     mine = rows[(rows >= group.first) & (rows < group.last)]
+    if not len(mine):
+        return
     first = int(np.searchsorted(rows, group.first))
     sub = _sub_group(group, _sub_bodies(bodies, rows), first, mine - group.first)
     action(sub)

@@ -9,7 +9,7 @@ from typing import Any
 from tussle.declare import units
 from tussle.declare.columns import Channel, Output
 from tussle.engine.table import ColumnPlace, Table
-from tussle.errors import WiringError, nearest_name
+from tussle.errors import WiringError, listed, nearest_name
 
 BELIEF = {"belief_pos": ("pos", 3, "m"), "belief_vel": ("vel", 3, "m/s"), "belief_quat": ("quat", 4, "")}
 
@@ -88,6 +88,7 @@ class Wiring:
         self._check_passthrough(controllers, [*working, motion])
         sense = self._bus(sensors, [])
         self._join(sense, sensors, [])
+        self._check_altered(sensors)
         stages: list[list[Any]] = [list(autonomies), *[[c] for c in working]]
         for producers, consumer in zip(stages, [*working, motion], strict=True):
             bus = self._bus(producers, [consumer])
@@ -114,6 +115,25 @@ class Wiring:
             for channel in needed if offered else []:
                 if channel not in offered:
                     raise self._no_writer(following[0], channel, offered, controller.instance_name)
+
+    def _check_altered(self, sensors: Sequence[Any]) -> None:
+        """Check that a sensor that alters channels stands after one that writes them, and is called as often."""
+        written: dict[str, Any] = {}
+        for sensor in sensors:
+            for column in written_channels(sensor).values():
+                for channel in column.channels:
+                    if sensor.alters_sensors:
+                        at = f"{self.where}: {sensor.instance_name} alters channel {channel!r}"
+                        if channel not in written:
+                            raise WiringError(
+                                f"{at}, which no sensor before it writes{nearest_name(channel, written)}; {listed(written)}"
+                            )
+                        if written[channel].rate != sensor.rate:
+                            own, its = (_rate_text(each) for each in (sensor, written[channel]))
+                            raise WiringError(
+                                f"{at} {own}, but {written[channel].instance_name} writes it {its}; give both the same rate"
+                            )
+                    written[channel] = sensor
 
     def _bus(self, producers: Sequence[Any], consumers: Sequence[Any]) -> Bus:
         """Allocate rows for all channels. Those of the consumers come first, in order, so that inputs are contiguous where possible."""
@@ -247,6 +267,10 @@ def _forms(column: Channel) -> dict[str, tuple[tuple[str, ...] | None, tuple[str
     if column.ragged:
         return {column.channels[0]: (column.fields, column.units)}
     return {channel: (None, (unit,)) for channel, unit in zip(column.channels, column.units, strict=True)}
+
+
+def _rate_text(sensor: Any) -> str:
+    return "in every step" if sensor.rate is None else f"at {sensor.rate:g} Hz"
 
 
 def _form_text(fields: tuple[str, ...] | None) -> str:

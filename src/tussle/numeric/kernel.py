@@ -16,7 +16,7 @@ import types
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import cache, update_wrapper
+from functools import cache, cached_property, update_wrapper
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -294,7 +294,7 @@ class Kernel(Device):
             self._build()
         return self._compiled
 
-    @property
+    @cached_property
     def address(self) -> int:
         """Address of the machine code, for Numba's calling convention."""
         result = self.compiled

@@ -48,7 +48,7 @@ def batch_of(inputs: Iterable[tuple[int, ExternalInput]], time_of: Callable[[int
         "t": [time_of(each.step) for _, each in rows],
         **{
             name: [getattr(each, name) for _, each in rows]
-            for name in ("step", "kind", "name", "network", "topic")
+            for name in ("step", "kind", "name", "network", "topic", "to")
         },
         "values": [None if each.values is None else json.dumps(each.values) for _, each in rows],
     }
@@ -63,7 +63,15 @@ def inputs_of(table: pa.Table, world: int) -> tuple[ExternalInput, ...]:
         RecordError: A value is no JSON.
     """
     return tuple(
-        ExternalInput(row["step"], row["kind"], row["name"], _read(row), row["network"], row["topic"])
+        ExternalInput(
+            row["step"],
+            row["kind"],
+            row["name"],
+            _read(row),
+            row["network"],
+            row["topic"],
+            tuple(row.get("to") or ()),
+        )
         for row in table.to_pylist()
         if row["world"] == world
     )

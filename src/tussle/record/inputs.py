@@ -28,6 +28,7 @@ class ExternalInput:
             message held an object that cannot be written down.
         network: Network of the message; "" is the one that reaches everyone.
         topic: Topic of the message; "" is the name of the type.
+        to: Ids of the entities that get the message; () is whoever the network reaches.
     """
 
     step: int
@@ -36,13 +37,16 @@ class ExternalInput:
     values: Any
     network: str = ""
     topic: str = ""
+    to: tuple[int, ...] = ()
 
 
 InputListener = Callable[[int, ExternalInput], None]
 """Called with the world and what has come from outside."""
 
 
-def of_message(sent: Messages, place: int, step: int, network: str, topic: str) -> ExternalInput:
+def of_message(
+    sent: Messages, place: int, step: int, network: str, topic: str, to: tuple[int, ...] = ()
+) -> ExternalInput:
     """The input that is a message of a batch.
 
     Args:
@@ -51,13 +55,14 @@ def of_message(sent: Messages, place: int, step: int, network: str, topic: str) 
         step: The step before which it came.
         network: As it was published.
         topic: The same.
+        to: The same.
     """
     values: dict[str, Any] | None = {name: _plain(sent.data[name], place) for name in sent.type.fields}
     try:
         json.dumps(values)
     except TypeError:
         values = None
-    return ExternalInput(step, MESSAGE, sent.type.__name__, values, network, topic)
+    return ExternalInput(step, MESSAGE, sent.type.__name__, values, network, topic, to)
 
 
 def _plain(values: Any, place: int) -> Any:

@@ -130,6 +130,11 @@ INPUTS = pa.schema(
         _field("network", pa.string(), "network of the message; empty is the one that reaches everyone"),
         _field("topic", pa.string(), "topic of the message; empty is the name of its type"),
         pa.field(
+            "to",
+            pa.list_(_I),
+            metadata={"doc": "ids of the entities that got the message; none is whoever the network reached"},
+        ),
+        pa.field(
             "values",
             pa.string(),
             metadata={

@@ -1,21 +1,28 @@
 """What must hold in a game, how near games come to breaking it, and how likely that is: specifications, rare events, worst games."""
 
 from tussle.stress.chances import Chance
+from tussle.stress.confidence import Assurance
 from tussle.stress.games import Played, StressGame
+from tussle.stress.given import GivenGame, given_games
 from tussle.stress.monitor import Monitor, Verdict
+from tussle.stress.shrink import SmallestGame
 from tussle.stress.specification import Specification
 from tussle.stress.splitting import Repetition
 from tussle.stress.study import Probability, Sample, Stress
 
 __all__ = [
+    "Assurance",
     "Chance",
+    "GivenGame",
     "Monitor",
     "Played",
     "Probability",
     "Repetition",
     "Sample",
+    "SmallestGame",
     "Specification",
     "Stress",
     "StressGame",
     "Verdict",
+    "given_games",
 ]

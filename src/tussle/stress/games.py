@@ -94,8 +94,14 @@ class Played:
 
     @classmethod
     def of_entry(cls, game: StressGame, entry: Mapping[str, Any]) -> Played:
-        """The game of a line."""
+        """The game of a line.
+
+        Raises:
+            ValueError: The line has other values; likewise KeyError and TypeError.
+        """
         steps, levels = list(map(int, entry["steps"])), list(map(float, entry["levels"]))
+        if len(steps) != len(levels) or levels != sorted(set(levels), reverse=True):
+            raise ValueError("the levels do not fall at their steps")
         verdict = Verdict(float(entry["robustness"]), steps, levels)
         return cls(game, verdict, float(entry["t"]), float(entry["cpu_s"]), str(entry["state_hash"]))
 

@@ -27,7 +27,7 @@ class Verdict:
     Attributes:
         robustness: Distance from failure, in the unit of what is compared; negative for a failure.
         steps: Steps at which the robustness that is known to be reached at most falls, ascending.
-        levels: What it falls to; the last is the robustness.
+        levels: What it falls to, descending; the last is the robustness.
     """
 
     robustness: float

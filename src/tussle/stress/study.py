@@ -26,6 +26,7 @@ from tussle.record.run_file import plain, put_whole, versions
 from tussle.stress.chances import Chance, chances
 from tussle.stress.games import GamePlayer, Ledger, Played, StressGame
 from tussle.stress.monitor import Watching
+from tussle.stress.shrink import MAX_SHRINK_GAMES, SmallestGame, shrink
 from tussle.stress.specification import Function, Specification, columns_of
 from tussle.stress.splitting import Repetition, interval, split
 
@@ -291,6 +292,19 @@ class Stress:
         with self._ledger(directory) as ledger:
             player = GamePlayer(self.batch, self.watching, ledger, **how)
             return chances(player.play, failed, moments, branches)
+
+    def smallest(self, failed: Played, max_games: int = MAX_SHRINK_GAMES) -> SmallestGame:
+        """A small game that fails, from one of this study: fewer entities, blocks and plugins, shorter, with rounder numbers.
+
+        Args:
+            failed: A game of this study that failed.
+            max_games: Games to play at most.
+
+        Raises:
+            ParameterError: The game did not fail, or the number is not allowed.
+        """
+        check_argument("max_games", max_games, Whole(1, 10**6))
+        return shrink(self.batch.missions[failed.game.point], failed, self.watching, max_games)
 
     def _notes(self, found: Probability) -> list[str]:
         repetitions, n = found.repetitions, len(found.repetitions)

@@ -216,8 +216,12 @@ def _slots(
     places: list[list[Any]] = [[p for p in given if isinstance(p, kind)] for kind in kinds]
     autonomies, controllers, sensors, motions = places
     inner = [*autonomies, *(b for a in autonomies for b in a.values.get("behaviors", ()))]
+    altering = [s for s in sensors if s.alters_sensors]
+    sensors = [s for s in sensors if not s.alters_sensors]
+    altered = [c for s in altering for c in written_channels(s).values()]
     measured = [c for s in sensors for name, c in type(s).outputs().items() if name not in BELIEF]
-    missing = _without([c for a in inner for _, c in read_channels(a)], measured)
+    written = [c for s in sensors for c in written_channels(s).values()]
+    missing = _without([c for a in inner for _, c in read_channels(a)], measured) + _without(altered, written)
     readers = [[c for _, c in read_channels(p)] for p in (*controllers, *motions)]
     wanted = next((columns for columns in readers if columns), [])
     written = [c for a in autonomies for b in sharing(a) for c in written_channels(b).values()]
@@ -226,7 +230,7 @@ def _slots(
         last = [c for c in controllers if not c.passthrough] or controllers
         end = list(written_channels(last[-1]).values()) if last else []
         motions = [sink(end or [*Driver.outputs().values(), *_without(written, [])])]
-    sensors = [*sensors, *([signal_sensor(missing)] if missing else [])]
+    sensors = [*sensors, *([signal_sensor(missing)] if missing else []), *altering]
     return {
         "autonomy": [pilot, *autonomies],
         "controller": controllers,

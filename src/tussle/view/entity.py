@@ -13,9 +13,11 @@ from tussle.declare.columns import Column, Numbers, Param, Subscribe
 from tussle.declare.comms import EVERYONE, SAME_ENTITY
 from tussle.declare.comms.topic import Delivery, TopicBuffer
 from tussle.declare.lists import RaggedColumn
+from tussle.declare.messages import Messages
 from tussle.engine.group import Group
 from tussle.engine.simulation import Simulation
 from tussle.engine.table import Stored, Table
+from tussle.view.orders import OrderKind, orders_of
 
 _COMPONENTS = {3: ("x", "y", "z"), 4: ("w", "x", "y", "z")}
 """Names of the components of a vector and of a quaternion."""
@@ -73,6 +75,7 @@ class EntityState:
         plugins: Plugin, such as "MotorSchemas.AvoidEntityMS" -> column -> reading.
         received: Messages that have arrived and are unread, at most 50.
         sent: Its messages that are under way or unread, at most 50.
+        orders: Messages that its plugins take and that can be typed.
     """
 
     t: float
@@ -84,6 +87,7 @@ class EntityState:
     plugins: dict[str, dict[str, Reading]] = field(default_factory=dict)
     received: list[ShownMessage] = field(default_factory=list)
     sent: list[ShownMessage] = field(default_factory=list)
+    orders: list[OrderKind] = field(default_factory=list)
 
 
 def entity_state(
@@ -126,6 +130,7 @@ def entity_state(
             if group.first <= row < group.last:
                 _read_plugins(group, row - group.first, group.table, state.plugins)
                 state.received.extend(_received(group, world, who) if has_messages else ())
+                state.orders.extend(orders_of(group) if has_messages else ())
         elif group.key in parked.tables:
             rows, held = parked.tables[group.key]
             place = np.flatnonzero(rows == row)
@@ -178,7 +183,7 @@ def _received(group: Group, world: int, who: int) -> list[ShownMessage]:
             if isinstance(column, Subscribe):
                 inbox = binding.plugin.__dict__[name]
                 for delivery in inbox.deliveries:
-                    messages += _messages(inbox.topic, delivery, _for_whom(delivery, world, who))
+                    messages += shown_messages(inbox.topic, delivery.batch, _for_whom(delivery, world, who))
     return messages[-MAX_MESSAGES:]
 
 
@@ -198,7 +203,7 @@ def _sent(simulation: Simulation, world: int, who: int) -> list[ShownMessage]:
     for topic in simulation.state.message_bus.topics.values():
         for delivery in _under_way(topic):
             mine = (delivery.batch.world == world) & (delivery.batch.sender == who)
-            messages += _messages(topic, delivery, np.flatnonzero(mine))
+            messages += shown_messages(topic, delivery.batch, np.flatnonzero(mine))
     return messages[-MAX_MESSAGES:]
 
 
@@ -210,8 +215,8 @@ def _under_way(topic: TopicBuffer) -> Iterator[Delivery]:
     yield from known.values()
 
 
-def _messages(topic: TopicBuffer, delivery: Delivery, numbers: np.ndarray) -> list[ShownMessage]:
-    batch = delivery.batch
+def shown_messages(topic: TopicBuffer, batch: Messages, numbers: np.ndarray) -> list[ShownMessage]:
+    """Some messages of a batch, (m,) their numbers, of more than 50 the last."""
     messages = []
     for i in numbers[-MAX_MESSAGES:]:
         fields: dict[str, Any] = {}

@@ -4,28 +4,30 @@ from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from functools import cached_property
 from typing import Any, Self
 
 import numpy as np
 
-from tussle.declare.messages import CustomKeyPress, Message, WorldPointClicked
+from tussle.declare.messages import CustomKeyPress, Message, RemoveEntity, WorldPointClicked
 from tussle.documents import POSITIVE, check_argument
 from tussle.engine.result import WorldResult
 from tussle.engine.simulation import Simulation
 from tussle.engine.step_end import world_result
-from tussle.errors import ParameterError, PluginError
+from tussle.errors import ParameterError, PluginError, nearest_name
 from tussle.pacing import Pace
 from tussle.record.inputs import ExternalInput
 from tussle.view.curves import GameCurves
 from tussle.view.drawn import DrawCollector, Shape
 from tussle.view.entity import EntityState, entity_state
+from tussle.view.feed import MessageFeed, TopicTraffic
 from tussle.view.frame import Event, Frame, FrameReader
 from tussle.view.latest import LINGER, LatestValue
+from tussle.view.orders import fields_from
 from tussle.view.pacing import checked_warp, faster, slower
 from tussle.view.playback import Order, PlaybackController
-from tussle.view.player import Injection, Player
+from tussle.view.player import Injection, Player, Setting
 from tussle.view.scenery import Scenery, scenery_of
 from tussle.view.series import CurveName
 from tussle.view.sight import fields_of_view
@@ -102,6 +104,8 @@ class Live:
         )
         self._shapes: LatestValue[tuple[Shape, ...]] = LatestValue(self._collector.shapes, FRAME_PERIOD, ring)
         self._result: LatestValue[WorldResult | None] = LatestValue(self._make_result, RESULT_PERIOD, ring)
+        self._feed = MessageFeed(simulation, world)
+        self._messages: LatestValue[list[TopicTraffic]] = LatestValue(self._feed.read, STATE_PERIOD, ring)
         self._entities: dict[int, LatestValue[EntityState | None]] = {}
         self._renew(True)
         self._thread: threading.Thread | None = None
@@ -178,10 +182,52 @@ class Live:
         number = None if seed is None else int(seed)
         self._give(lambda: self._playback.begin_anew(number), may_cut_in=True)
 
-    def publish(self, type_: type[Message], *, network: str = "", topic: str = "", **fields: Any) -> None:
-        """Publish a message to the plugins before the next step and its replays. Errors appear in `notes`."""
+    def publish(
+        self,
+        type_: type[Message],
+        *,
+        network: str = "",
+        topic: str = "",
+        receivers: Iterable[int] = (),
+        **fields: Any,
+    ) -> None:
+        """Publish a message to the plugins before the next step and its replays, as `Simulation.publish`. Errors appear in `notes`."""
         self._check_is_own()
-        self._give(lambda: self._playback.say(type_, network, topic, fields))
+        ids = tuple(map(int, receivers))
+        self._give(lambda: self._playback.say(type_, network, topic, fields, ids))
+
+    def order(self, receivers: Iterable[int], network: str, topic: str, values: Mapping[str, Any]) -> None:
+        """Publish a message that a user has typed to some entities, see `tussle.view.orders`. Errors of the game appear in `notes`.
+
+        Raises:
+            ParameterError: There is no such topic, or a value does not fit.
+        """
+        topics = self.simulation.state.message_bus.topics
+        buffer = topics.get((network, topic))
+        if buffer is None:
+            names = sorted("/".join(each) for each in topics)
+            raise ParameterError(
+                f"there is no topic {network}/{topic}{nearest_name(f'{network}/{topic}', names)}"
+            )
+        fields = fields_from(buffer.type, values)
+        self.publish(buffer.type, network=network, topic=topic, receivers=receivers, **fields)
+
+    def set_parameter(self, entities: Iterable[int], path: str, value: Any) -> None:
+        """Set a parameter of some entities before the next step, in SI units. Errors appear in `notes`.
+
+        Args:
+            entities: Their ids.
+            path: Plugin and parameter, "GoTo.speed".
+            value: The value, or those of its components.
+        """
+        self._check_is_own()
+        ids = tuple(map(int, entities))
+        self._give(lambda: self._playback.set_parameter(path, value, ids))
+
+    def remove(self, entities: Iterable[int]) -> None:
+        """Remove entities at the end of the next step."""
+        for who in entities:
+            self.publish(RemoveEntity, entity=int(who), why="order")
 
     def publish_click(self, point: Any) -> None:
         """Publish `WorldPointClicked` with a point [m], (3,), on the network that reaches everyone.
@@ -225,6 +271,7 @@ class Live:
             if self._thread.is_alive():
                 return  # the last step takes that long
         self._collector.close()
+        self._feed.close()
         self._player.close()
 
     def settle(self, timeout: float = 60.0) -> bool:
@@ -321,8 +368,8 @@ class Live:
         return list(self._player.events)
 
     @property
-    def injections(self) -> list[Injection]:
-        """Messages to the plugins from outside."""
+    def injections(self) -> list[Injection | Setting]:
+        """Messages to the plugins, and parameters that were set, from outside."""
         return list(self._player.injections)
 
     @property
@@ -357,6 +404,10 @@ class Live:
         """Shapes drawn in the last step, and earlier ones that last. Collected only while requested."""
         return self._taken(self._shapes) or ()
 
+    def messages(self) -> list[TopicTraffic]:
+        """What plugins publish, by topic. Listened to only while requested: nothing at the first request."""
+        return self._taken(self._messages) or []
+
     def result(self) -> WorldResult | None:
         """The provisional result, without state hash until the game ends; None at the first request."""
         return self._taken(self._result)  # type: ignore[no-any-return]
@@ -384,6 +435,7 @@ class Live:
             self._frame,
             self._result,
             self._shapes,
+            self._messages,
             *list(self._entities.values()),
         ]
         for latest in values:
@@ -395,6 +447,10 @@ class Live:
             self._collector.open()
         else:
             self._collector.close()
+        if self._messages.idle_for < FORGET_TIME:
+            self._feed.open()
+        else:
+            self._feed.close()
         for who, latest in list(self._entities.items()):
             if latest.idle_for > FORGET_TIME:
                 self._entities.pop(who, None)

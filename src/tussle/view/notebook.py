@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import asyncio
-import threading
 from dataclasses import dataclass
 from html import escape
-from typing import Any
 
 from tussle.documents import Whole, check_argument
 from tussle.engine.simulation import Simulation
 from tussle.errors import MissingExtraError
 from tussle.view.live import Live
-from tussle.view.page.assemble import FRAMED, page_html
+from tussle.view.notebook_widget import GameView, RunView
+from tussle.view.page.assemble import page_html
 from tussle.view.page.recorded import RecordedData
 from tussle.view.recording import Recording
 
@@ -45,7 +43,7 @@ class RecordedView:
         return f"RecordedView({len(self.html):,} characters; notebooks show it)"
 
 
-def view_run(recording: Recording, height: int = 520) -> Any:
+def view_run(recording: Recording, height: int = 520) -> RecordedView | RunView:
     """Return a view of a recorded run, with a time line.
 
     Runs of at most `MAX_STATES` states are whole in the cell. Larger ones need anywidget and the kernel.
@@ -65,14 +63,10 @@ def view_run(recording: Recording, height: int = 520) -> Any:
         blobs = {name: data.blob(name) or b"" for name in data.names}
         return RecordedView(page_html(data.document(), blobs), height)
     _check_extra()
-    from tussle.view.notebook_widget import RunWidget
-
-    served = RecordedData(recording, is_file=False)
-    html = page_html(served.document(source="framed"), entry=FRAMED)
-    return RunWidget(served, html, height)
+    return RunView(RecordedData(recording, is_file=False), height)
 
 
-def view_simulation(simulation: Simulation, world: int = 0, height: int = 520) -> Any:
+def view_simulation(simulation: Simulation, world: int = 0, height: int = 520) -> GameView:
     """Return a view that plays a simulation, paused at first. `stop()` of the view, or closing the simulation, ends it.
 
     Args:
@@ -86,9 +80,7 @@ def view_simulation(simulation: Simulation, world: int = 0, height: int = 520) -
     """
     check_argument("height", height, HEIGHT)
     _check_extra()
-    from tussle.view.notebook_widget import GameWidget
-
-    return GameWidget(Live(simulation, world, is_paused=True), height)
+    return GameView(Live(simulation, world, is_paused=True), height)
 
 
 def _check_extra() -> None:
@@ -98,13 +90,3 @@ def _check_extra() -> None:
         raise MissingExtraError(
             "the view in a notebook needs anywidget, which is not installed: pip install 'tussle[notebook]'"
         ) from error
-
-
-def loop_of_kernel() -> asyncio.AbstractEventLoop:
-    """Return the event loop of the kernel, whose messages only its own thread may send; without one, a new loop in a thread."""
-    try:
-        return asyncio.get_running_loop()
-    except RuntimeError:
-        loop = asyncio.new_event_loop()
-        threading.Thread(target=loop.run_forever, name="tussle notebook", daemon=True).start()
-        return loop

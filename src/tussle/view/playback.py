@@ -257,6 +257,12 @@ class PlaybackController:
         self.pace.restart()
         self.speed.restart()
 
-    def say(self, type_: type[Message], network: str, topic: str, fields: dict[str, Any]) -> None:
+    def say(
+        self, type_: type[Message], network: str, topic: str, fields: dict[str, Any], to: tuple[int, ...]
+    ) -> None:
         """Publish a message to the plugins."""
-        self.player.publish(type_, network, topic, fields)
+        self.player.publish(type_, network, topic, fields, to)
+
+    def set_parameter(self, path: str, value: Any, to: tuple[int, ...]) -> None:
+        """Set a parameter of some entities."""
+        self.player.set_parameter(path, value, to)

@@ -10,10 +10,12 @@ import numpy as np
 
 from tussle.declare.displays import counted
 from tussle.declare.messages import Message, Messages
+from tussle.engine.delivery import check_order
 from tussle.engine.simulation import Simulation
 from tussle.record import Events
 from tussle.view.curves import GameCurves
 from tussle.view.frame import Event, frame_of
+from tussle.view.orders import setting_inputs
 from tussle.view.timeline import History, Timeline
 
 if TYPE_CHECKING:
@@ -21,6 +23,23 @@ if TYPE_CHECKING:
 
 MAX_EVENTS = 100_000
 """Events up to which collisions are kept."""
+
+
+@dataclass(frozen=True)
+class Setting:
+    """A parameter of some entities that is set from outside.
+
+    Attributes:
+        step: The step before which it is set.
+        path: Plugin and parameter, "GoTo.speed".
+        value: The value, or those of its components.
+        to: Ids of the entities.
+    """
+
+    step: int
+    path: str
+    value: Any
+    to: tuple[int, ...]
 
 
 @dataclass(frozen=True)
@@ -33,6 +52,7 @@ class Injection:
         network: Its network; "" is the one that reaches everyone.
         topic: Its topic; "" is the type's name.
         fields: Field -> value.
+        to: Ids of the entities that get it; () is whoever the network reaches.
     """
 
     step: int
@@ -40,6 +60,7 @@ class Injection:
     network: str = ""
     topic: str = ""
     fields: dict[str, Any] = field(default_factory=dict)
+    to: tuple[int, ...] = ()
 
 
 class Player:
@@ -62,7 +83,7 @@ class Player:
         history: Past frames.
         curves: What its quantities were in each step.
         step: Present step of the world.
-        injections: Messages from outside, in order of their steps.
+        injections: Messages and settings from outside, in order of their steps.
         events: Births, deaths, captures, collisions, ends, in order.
         notes: What the user should know, one line each.
         is_broken: A step failed; the game can only be rewound.
@@ -79,7 +100,7 @@ class Player:
         self.simulation, self.world = simulation, world
         self.timeline = Timeline(simulation, world, every, 0.5 * limit)
         self.history = History(simulation, world, 0.5 * limit)
-        self.injections: list[Injection] = []
+        self.injections: list[Injection | Setting] = []
         self._inputs: Sequence[ExternalInput] = ()
         self._play_inputs(inputs)
         self.events: list[Event] = []
@@ -120,11 +141,9 @@ class Player:
         sim.events.is_replaying = step < self._furthest_step
         self._furthest_step = max(self._furthest_step, step + 1)
         try:
-            for sent in self.injections:
-                if sent.step == step:
-                    sim.publish(
-                        sent.type, [self.world], network=sent.network, topic=sent.topic, **sent.fields
-                    )
+            for given in self.injections:
+                if given.step == step:
+                    self._give(given)
             sim.step()
         except BaseException:
             self.is_broken = True
@@ -133,6 +152,22 @@ class Player:
             sim.events.is_replaying = False
         self.step = self._read_step()
         self._remember()
+
+    def _give(self, given: Injection | Setting) -> None:
+        """Let what came from outside come now."""
+        sim = self.simulation
+        if isinstance(given, Setting):
+            for written in setting_inputs(sim, self.world, given.path, given.value, given.to):
+                sim.play_input(written, self.world)
+        else:
+            sim.publish(
+                given.type,
+                [self.world],
+                network=given.network,
+                topic=given.topic,
+                receivers=given.to,
+                **given.fields,
+            )
 
     def catch_up(self) -> bool:
         """Read the state after steps that others made; return whether they have reset the world since the last call."""
@@ -187,17 +222,42 @@ class Player:
 
     # -- another course -----------------------------------------------------------------------------------------------------------
 
-    def publish(self, type_: type[Message], network: str, topic: str, fields: dict[str, Any]) -> None:
+    def publish(
+        self,
+        type_: type[Message],
+        network: str,
+        topic: str,
+        fields: dict[str, Any],
+        to: tuple[int, ...] = (),
+    ) -> None:
         """Publish a message to the plugins before the next step.
 
         Raises:
-            ParameterError: The type has no such field.
+            ParameterError: The type has no such field, or an entity cannot get it.
             WiringError: There is no such network, or the topic carries another type.
         """
         if self.is_over:
             self.note(f"{type_.__name__}: the game is over, so the message is dropped")
             return
-        self._check(type_, network, topic, fields)
+        self._check(type_, network, topic, fields, to)
+        self._take_course()
+        self.injections.append(Injection(self.step, type_, network, topic, fields, to))
+
+    def set_parameter(self, path: str, value: Any, to: tuple[int, ...]) -> None:
+        """Set a parameter of some entities before the next step.
+
+        Raises:
+            ParameterError: An entity does not exist or has no such parameter, or the value is not allowed.
+        """
+        if self.is_over:
+            self.note(f"{path}: the game is over, so it is not set")
+            return
+        setting_inputs(self.simulation, self.world, path, value, to)
+        self._take_course()
+        self.injections.append(Setting(self.step, path, value, to))
+
+    def _take_course(self) -> None:
+        """Drop what lies in the future: something comes from outside before the next step."""
         step = self.step
         if dropped := [given for given in self._inputs if given.step >= step]:
             self._play_inputs([given for given in self._inputs if given.step < step])
@@ -208,19 +268,25 @@ class Player:
             self._end_recordings()
             for part in (self.timeline, self.history, self.curves):
                 part.forget_after(step)
-            self.injections[:] = [sent for sent in self.injections if sent.step <= step]
+            self.injections[:] = [given for given in self.injections if given.step <= step]
             self._forget_events(step)
             self._furthest_step = step
-        self.injections.append(Injection(step, type_, network, topic, fields))
 
     def _play_inputs(self, inputs: Sequence[ExternalInput]) -> None:
         self._inputs = inputs
         self.simulation.play_inputs(inputs, self.world)
 
-    def _check(self, type_: type[Message], network: str, topic: str, fields: dict[str, Any]) -> None:
-        """Publish the message to no world, so that errors are raised now and not in the step."""
-        self.simulation.publish(type_, [], network=network, topic=topic)
-        Messages.make(type_, np.zeros(1, np.int64), np.zeros(1, np.int64), fields)
+    def _check(
+        self, type_: type[Message], network: str, topic: str, fields: dict[str, Any], to: tuple[int, ...]
+    ) -> None:
+        """Raise errors of a message now and not in the step."""
+        bus, batch = (
+            self.simulation.state.message_bus,
+            Messages.make(type_, np.array([self.world]), np.zeros(1, np.int64), fields),
+        )
+        check_order(
+            self.simulation.state, bus.topic(network, topic or type_.__name__, type_, "publish"), batch, to
+        )
 
     def reset(self, seed: int | None) -> None:
         """Restart the world, with another seed if one is given."""

@@ -47,7 +47,7 @@ if __name__ == "__main__":
         try:
             importlib.import_module(module.name)
         except tussle.errors.MissingExtraError as error:
-            assert "tussle[train]" in str(error), error  # PyTorch is not in the test extra
+            assert module.name in ("tussle.rl.actor_critic", "tussle.rl.train"), error  # PyTorch is not in the test extra
 """
 
 

@@ -52,9 +52,28 @@ def test_a_study_that_is_killed_goes_on(process, tussle, folder):
     assert (folder / "other/result.json").read_text() == result
 
 
+def test_the_smallest_failing_game_plays_alone(tussle, folder):
+    done = tussle(*STUDY, "-n", "3", "--spec", "always (distance(left, right) > 7.5 m)", "--shrink")
+    assert "no part of it can be left out" in " ".join(done.stdout.split())
+    small = folder / "out/failures/smallest.xml"
+    assert 'end="6' not in small.read_text()
+    tussle("run", small, "--plugin-path", EXAMPLE / "hover.py")
+
+
+def test_a_check_ends_with_an_exit_code(tussle, folder):
+    check = (*STUDY, "-n", "40", "--holds", "0.9", "--junit", "xml/stress.xml")
+    done = tussle(*check, "--spec", "always (distance(left, right) > 7 m)", "--out", "bad", code=6)
+    assert "does not hold with 95 % confidence above 0.9" in " ".join(done.stdout.split())
+    assert "bad/failures/0.xml" in (folder / "xml/stress.xml").read_text()
+    tussle(*check)
+    assert "<failure" not in (folder / "xml/stress.xml").read_text()
+
+
 @pytest.mark.parametrize(
     ("changes", "message", "code"),
     [
+        (("--holds", "1"), "it takes a probability from 0 to less than 1", 2),
+        (("--junit", "a.xml"), "--junit needs --holds", 2),
         (("--spec", ""), "--spec is missing", 2),
         (("--spec", "always (distance(left, right) > 3 s)"), "m and s cannot be compared", 1),
         (("--spec", "scores[1] > 3"), "there is no 'scores", 1),

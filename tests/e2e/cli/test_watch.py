@@ -96,8 +96,13 @@ def test_a_game_is_served_steered_and_ended_with_its_summary(watching, folder):
 
 def test_what_is_watched_has_the_hash_that_it_has_alone(tussle):
     alone = re.search(r"hash\s+(\w{32})", tussle("run", "game.xml", "--no-log").stdout)[1]
-    seen = tussle("view", "game.xml", "--no-browser", "--exit-when-over", "--pace", "max").stdout
+    seen = tussle("view", "game.xml", "--no-browser", "--exit-when-over", "--pace", "max", "--roles").stdout
     assert f"hash   {alone}" in seen
+    assert re.findall(rf"^ (\w.*): {ADDRESS.pattern}$", seen, re.MULTILINE) == [
+        "operate team 1",
+        "operate team 2",
+        "watch",
+    ]
     assert "end time reached" in seen
 
 

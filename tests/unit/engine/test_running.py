@@ -23,7 +23,7 @@ from small_worlds import (
 from tussle import Block, Mission, Simulation
 from tussle.api import Autonomy, Interaction, Metric, Output, Param, State
 from tussle.errors import MissionError, ParameterError, SnapshotError
-from tussle.stock import NoisyContacts, Predator, SimpleCapture, SimpleCollision, Still, Unicycle
+from tussle.stock import FreeBody, NoisyContacts, Predator, SimpleCapture, SimpleCollision, Still, Unicycle
 
 
 class Tally(Metric):
@@ -552,3 +552,14 @@ def test_an_error_in_one_part_is_raised_when_all_parts_have_ended():
         with pytest.raises(ZeroDivisionError):
             sim.state.context.split(1000, run)
         assert sum(last - first for first, last in begun) == 1000
+
+
+def test_an_angular_velocity_that_is_written_is_flown_on_with():
+    block = Block(name="a", count=2, motion=FreeBody(), position=(0, 0, 1000))
+    with Simulation(Mission(blocks=[block], dt=0.01, end=1.0), 1) as sim:
+        sim.step(3)
+        sim.write("a.omega", [[[0.0, 0.0, 0.0], [0.0, 0.0, 2.0]]])
+        sim.step(10)
+        omega, quat = sim.read("a.omega")[0][0], sim.read("a.quat")[0][0]
+    np.testing.assert_allclose(omega, [[0, 0, 0], [0, 0, 2]], atol=1e-9)
+    np.testing.assert_allclose(quat, [[1, 0, 0, 0], [np.cos(0.1), 0, 0, np.sin(0.1)]], atol=1e-9)

@@ -245,6 +245,7 @@ def test_examples_fly_alone_as_in_a_stack(name):
         assert sim.state_hash(1) == alone.state_hash()
 
 
+@pytest.mark.filterwarnings("ignore:.*it tumbles:RuntimeWarning")
 @pytest.mark.parametrize("processes", [1, 2])
 def test_an_aircraft_that_is_no_longer_finite_ends_its_world_or_is_removed_alone(processes):
     good = JSBSimControl(aircraft="c172p", processes=processes)
@@ -297,3 +298,21 @@ def test_a_propeller_that_begins_to_turn_does_not_throw_the_aircraft_over(tmp_pa
         sim.step()
         fastest = max(fastest, float(np.abs(body(sim, "omega")).max()))
     assert 0.0 < math.degrees(fastest) < 100.0
+
+
+def test_an_aircraft_that_tumbles_from_the_start_is_told_once():
+    with Simulation(mission(JSBSimControl(aircraft="c172p"), Stick(), count=2), 1) as simulation:
+        simulation.write("a.omega", [[[0.0, 0.0, 0.0], [40.0, 0.0, 0.0]]])
+        with pytest.warns(
+            RuntimeWarning,
+            match=r"JSBSimControl: a 2 of world 0 turns at \d+ deg/s at t = 0\.\d+ s: it tumbles",
+        ) as told:
+            simulation.step(20)
+        assert len(told) == 1
+
+
+def test_an_aircraft_that_tumbles_later_is_not():
+    with Simulation(mission(JSBSimControl(aircraft="c172p"), Stick()), 1) as simulation:
+        simulation.step(130)
+        simulation.write("a.omega", [[[40.0, 0.0, 0.0]]])
+        simulation.step(3)

@@ -27,6 +27,7 @@ def seen(n, dt, **columns):
     return SimpleNamespace(
         n=n,
         dt=dt,
+        kept={},
         column=columns.__getitem__,
         split=lambda run, *given, least: run(*given, (0, n)),
         **columns,

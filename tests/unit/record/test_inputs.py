@@ -13,7 +13,7 @@ from tussle.record import ExternalInput, load_inputs
 from tussle.record.input_table import inputs_of
 from tussle.record.inputs import fields_of
 from tussle.record.schema import INPUTS
-from tussle.stock import SingleIntegrator
+from tussle.stock import SingleIntegrator, Still
 from tussle.view import Live
 from tussle.view.serve import Session
 
@@ -69,11 +69,12 @@ def mission(end=6.0):
 def meddle(sim, rng, world=None):
     """One to three inputs of random kinds."""
     worlds = None if world is None else [world]
-    for kind in rng.integers(0, 4, rng.integers(1, 4)):
-        if kind == 0:
+    for kind in rng.integers(0, 5, rng.integers(1, 4)):
+        if kind in (0, 4):
             marks = rng.normal(size=(2, rng.integers(0, 4)))
+            some = rng.choice(np.arange(1, 6), rng.integers(1, 4), replace=False) if kind == 4 else ()
             sim.publish(
-                Course, worlds, to=rng.normal(size=3) * 100, speed=rng.uniform(0, 20), who=int(rng.integers(0, 6)),
+                Course, worlds, receivers=some, to=rng.normal(size=3) * 100, speed=rng.uniform(0, 20), who=int(rng.integers(0, 6)),
                 marks=[marks] * (sim.n_worlds if world is None else 1), why="because",
             )  # fmt: skip
         elif kind == 1:
@@ -102,6 +103,7 @@ def test_a_game_to_which_the_inputs_come_again_is_the_same(tmp_path):
     wanted = played(tmp_path / "first")
     inputs = load_inputs(tmp_path / "first")
     assert {each.kind for each in inputs} == {"message", "column"}
+    assert {bool(each.to) for each in inputs if each.kind == "message"} == {False, True}
     assert [each.step for each in inputs] == sorted(each.step for each in inputs)
     with Simulation(mission(), 1) as sim:
         sim.run()
@@ -146,6 +148,53 @@ def test_each_world_of_a_stack_has_its_own(tmp_path):
             sim.play_inputs(load_inputs(tmp_path / "run", world))
             sim.step(40)
             assert sim.state_hash() == hashes[world]
+
+
+def test_an_order_reaches_those_whom_it_is_for():
+    with Simulation(mission(), [4, 8]) as sim:
+        sim.publish(Course, [1], receivers=[2, 5], why="x", speed=3.0, to=(9, 9, 9))
+        sim.step(2)
+        tempo, _ = sim.read("fleet.Steered.tempo")
+    assert tempo.tolist() == [[0, 0, 0, 0, 0], [0, 3, 0, 0, 3]]
+
+
+def test_an_order_that_nobody_would_get_is_refused(tmp_path):
+    deaf = Block(name="deaf", motion=Still(), radius=0.5)
+    with (
+        Simulation(mission().replace(blocks=[*mission().blocks, deaf]), 4) as sim,
+        Recorder(sim, tmp_path / "run"),
+    ):
+        deaf_id = int(sim.state.population.bodies.id[sim.state.population.bodies.block == 2][0])
+        with pytest.raises(
+            ParameterError, match=r"receivers = 77 is not allowed; world 0 has no entity 77 now"
+        ):
+            sim.publish(Course, receivers=[1, 77])
+        with pytest.raises(ParameterError, match=rf"no plugin of entity {deaf_id} subscribes to \S+/Course"):
+            sim.publish(Course, receivers=[deaf_id])
+        with pytest.raises(ParameterError, match=r"subscribes to \S+/Cours \(did you mean '\S+/Course'"):
+            sim.publish(Course, topic="Cours", receivers=[1])
+        sim.step()
+    assert load_inputs(tmp_path / "run") == ()
+
+
+def test_an_order_of_the_live_game_is_part_of_it(tmp_path):
+    with (
+        Simulation(mission(), 2) as sim, Recorder(sim, tmp_path / "run"),
+        Live(sim, threaded=False, is_paused=True) as live,
+    ):  # fmt: skip
+        live.step(5)
+        live.publish(Course, receivers=[3], why="x", speed=4.0, to=(50, 0, 0))
+        live.publish(Course, receivers=[99], speed=4.0)
+        assert live.notes == ["publish: receivers = 99 is not allowed; world 0 has no entity 99 now"]
+        live.step(20)
+        there = sim.state_hash()
+        live.seek(0.2)
+        live.step(23)
+        assert sim.state_hash() == there
+    with Simulation(mission(), 2) as again:
+        again.play_inputs(load_inputs(tmp_path / "run"))
+        again.step(25)
+        assert again.state_hash() == there
 
 
 class Numbers(Message):

@@ -118,7 +118,12 @@ def test_a_directory_of_something_else_is_refused(found, tmp_path):
     copy = tmp_path / "copy"
     shutil.copytree(path, copy)
     lines = (copy / "games.jsonl").read_text().splitlines()
-    for wrong in ("{}", "[1]", '{"game": "x"', lines[0].replace('"levels": [', '"levels": ["a",')):
+    for wrong in (
+        "{}",
+        "[1]",
+        '{"game": "x"',
+        *(lines[0].replace('"levels": [', f'"levels": [{text}') for text in ('"a", ', '"1e9", ')),
+    ):
         (copy / "games.jsonl").write_text("\n".join([lines[0], wrong, ""]))
         with pytest.raises(BatchError, match="line 2 is damaged"):
             study().sample(5, directory=copy)

@@ -140,16 +140,22 @@ class Index:
             self._blocks.clear()
             self._fixed = bool(np.isinf(self.reach).all())
         self.built += 1
-        pos, worlds, work = (x, y, z), (self.world_start, self.members), (self._keys, self._scratch)
-        n, cells, strips = len(self.order), self.inverse_cell, (self._strips, self._world_strip)
-
-        arrays = pos, cells, worlds, work, self._placed, self.points, strips
         if split is None:
-            kernels.build(*arrays, (kernels.KEYS + kernels.SORT + kernels.PLACES, 0, n))
+            kernels.build(*self.building(x, y, z))
         else:  # rows lie anywhere in memory: what takes time is to fetch them
+            *arrays, (_, _, n) = self.building(x, y, z)
             split(n, lambda *part: kernels.build(*arrays, (kernels.KEYS + kernels.PART, *part)))
             kernels.build(*arrays, (kernels.SORT, 0, n))
             split(n, lambda *part: kernels.build(*arrays, (kernels.PLACES, *part)))
+
+    def building(self, x: Floats, y: Floats, z: Floats) -> tuple[Any, ...]:
+        """Arguments of `kernels.build` for the positions of all places."""
+        worlds, work = (self.world_start, self.members), (self._keys, self._scratch)
+        strips, part = (
+            (self._strips, self._world_strip),
+            (kernels.KEYS + kernels.SORT + kernels.PLACES, 0, len(self.order)),
+        )
+        return (x, y, z), self.inverse_cell, worlds, work, self._placed, self.points, strips, part
 
     def update(self, first: int, last: int, x: Floats, y: Floats, z: Floats) -> None:
         """Update the positions x, y, z (N,) [m] of rows [first, last). Only if all reaches are infinite."""
@@ -174,27 +180,35 @@ class Index:
             return blocks
         elif blocks.built == self.built:
             return blocks
-        index = self.order, self._strips, self._world_strip, self.world_start, self._keys
-        table = index, (first, last), self.points, (self.inverse_cell, self.reach)
-        while not self._cut(blocks, table, split):
+        while not self._cut(blocks, (first, last), split):
             blocks.spans = np.empty((2, 2 * blocks.spans.shape[1]), np.int64)
         blocks.built = self.built
         return blocks
 
-    def _cut(self, blocks: Blocks, table: tuple[Any, ...], split: Split | None) -> bool:
+    @property
+    def is_fixed(self) -> bool:
+        """Whether all reaches are infinite: places and blocks depend only on the rows."""
+        return self._fixed
+
+    def cutting(self, rows: tuple[int, int], blocks: Blocks) -> tuple[Any, ...]:
+        """Arguments of `kernels.cut_blocks` for rows [first, last), without the part to do."""
+        index = self.order, self._strips, self._world_strip, self.world_start, self._keys
+        cells, arrays = (self.inverse_cell, self.reach), (blocks.cuts, blocks.spans)
+        return index, rows, self.points, cells, arrays, blocks.points
+
+    def _cut(self, blocks: Blocks, rows: tuple[int, int], split: Split | None) -> bool:
         """Cut blocks and find their spans. Return whether the spans fit."""
-        room = blocks.spans.shape[1]
-        arrays = blocks.cuts, blocks.spans
+        room, arrays = blocks.spans.shape[1], self.cutting(rows, blocks)
         if split is None:
             part = kernels.GROUP + kernels.SPANS, 0, -1, 0, room
-            blocks.n_blocks, used, blocks.most = kernels.cut_blocks(*table, arrays, blocks.points, part)
+            blocks.n_blocks, used, blocks.most = kernels.cut_blocks(*arrays, part)
             return bool(used <= room)
-        n, _, _ = kernels.cut_blocks(*table, arrays, blocks.points, (kernels.GROUP, 0, 0, 0, 0))
+        n, _, _ = kernels.cut_blocks(*arrays, (kernels.GROUP, 0, 0, 0, 0))
         made: list[tuple[bool, int]] = []
 
         def find(begin: int, end: int) -> None:
             part = kernels.SPANS, begin, end, room * begin // max(n, 1), room * end // max(n, 1)
-            _, used, most = kernels.cut_blocks(*table, arrays, blocks.points, part)
+            _, used, most = kernels.cut_blocks(*arrays, part)
             made.append((used <= part[-1], most))
 
         split(n, find)

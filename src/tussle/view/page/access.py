@@ -7,6 +7,7 @@ import ipaddress
 import secrets
 import socket
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 from tussle.errors import ViewError
 
@@ -31,24 +32,48 @@ HEADERS = {
 """Headers of each answer: browsers pass the address to nobody, and no other page embeds this one."""
 
 
+DIRECT, OPERATE, WATCH = "direct", "operate", "watch"
+
+
+@dataclass(frozen=True)
+class PageRole:
+    """What somebody who has an address may do.
+
+    Attributes:
+        kind: "direct": everything; "operate": give orders to the entities of a team; "watch": nothing that changes the game or its time.
+        team: The team, of an operator.
+    """
+
+    kind: str = DIRECT
+    team: int | None = None
+
+    def __str__(self) -> str:
+        return self.kind if self.team is None else f"{self.kind} team {self.team}"
+
+
 class Access:
-    """Decides which requests for the page and its socket are answered.
+    """Decides which requests for the page and its socket are answered, and what they may do.
 
     Args:
         host: Address that the page is served at.
         port: Its port.
+        roles: Roles besides the one that may do everything; each has an address of its own.
 
     Attributes:
-        token: Secret part of the address.
+        token: Secret part of the address of who may do everything.
+        url: This address.
+        addresses: Role -> its address.
     """
 
-    def __init__(self, host: str, port: int) -> None:
-        self.token = secrets.token_hex(TOKEN_BYTES)
+    def __init__(self, host: str, port: int, roles: Sequence[PageRole] = ()) -> None:
+        self._roles = {secrets.token_hex(TOKEN_BYTES): role for role in (PageRole(), *roles)}
+        self.token = next(iter(self._roles))
         self._port = port
         self._is_everywhere = host in EVERYWHERE
         name = "127.0.0.1" if self._is_everywhere else f"[{host}]" if ":" in host else host.lower()
         self._names = {*LOOPBACK_NAMES, name}
-        self.url = f"http://{name}:{port}/{self.token}"
+        self.addresses = {role: f"http://{name}:{port}/{token}" for token, role in self._roles.items()}
+        self.url = self.addresses[PageRole()]
 
     def refusal(self, path: str, hosts: Sequence[str], origins: Sequence[str]) -> str:
         """Return why a request is refused; "" if it is accepted.
@@ -62,10 +87,18 @@ class Access:
             return f"This page is served at port {self._port} of this machine's own addresses only.\n"
         if list(origins) not in ([], [f"http://{hosts[0]}"]):
             return "This page is not open to other pages.\n"
-        token = path.removeprefix("/").partition("?")[0].partition("/")[0]
-        if not hmac.compare_digest(token.encode(errors="replace"), self.token.encode()):
+        if self.role_of(path) is None:
             return "The address is not complete: take all of it from where tussle was started.\n"
         return ""
+
+    def role_of(self, path: str) -> PageRole | None:
+        """Return the role of who asks for a path; None without the secret part of an address."""
+        token = path.removeprefix("/").partition("?")[0].partition("/")[0].encode(errors="replace")
+        found = None
+        for known, role in self._roles.items():  # all of them: the time tells nothing
+            if hmac.compare_digest(token, known.encode()):
+                found = role
+        return found
 
     def _is_served(self, host: str) -> bool:
         name, _, port = host.lower().rpartition(":")

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from tussle.documents import Checked, Either, Maybe, Real, Rule, Whole, check_argument, problem
+from tussle.documents import Checked, Either, Map, Maybe, Real, Rule, Whole, check_argument, problem
 from tussle.errors import ParameterError
 from tussle.view.live import Live
 
@@ -19,6 +19,8 @@ REACH = 1e3
 """Largest distance of a point of the world, in sizes of the scene."""
 MAX_WANTED = 64
 """Quantities of the curves that one browser can choose."""
+MAX_RECEIVERS = 1000
+"""Entities that one order is for."""
 CUSTOM_KEY = ";"
 """The key that is kept for the plugins, as in SCRIMMAGE."""
 
@@ -28,6 +30,10 @@ COORDINATE, ID = Real(-MAX_COORDINATE, MAX_COORDINATE), Whole(0, MAX_ID)
 
 def _point_problem(value: list[Any], _: str) -> str:
     return "" if len(value) == 3 else "it has not three numbers"
+
+
+def _ids_problem(value: list[Any], _: str) -> str:
+    return "" if 1 <= len(value) <= MAX_RECEIVERS else "it has none, or too many"
 
 
 def _wanted_problem(value: list[Any], _: str) -> str:
@@ -40,6 +46,10 @@ def _wanted_problem(value: list[Any], _: str) -> str:
 POINT = Either((Checked([COORDINATE], _point_problem),), "x, y, z in m")
 PAIRS = [Either((str, ID), "a name and an id")]
 WANTED = Either((Checked([PAIRS], _wanted_problem),), f"at most {MAX_WANTED} pairs of a name and an id")
+IDS = Either((Checked([Whole(1, MAX_ID)], _ids_problem),), f"1 to {MAX_RECEIVERS} ids")
+TYPED = Map(
+    Either((Real(), bool, str, [Either((Real(), bool, [Real()]), "numbers")]), "a number, a text or a list")
+)
 KEY = Either(((CUSTOM_KEY,),), f"the key {CUSTOM_KEY}")
 WARP = Either((Maybe(Real(1e-6, 1e6)),), "a number from 1e-06 to 1e+06, or null")
 
@@ -52,11 +62,13 @@ class Command:
         do: Does it, called with the fields by name.
         fields: Name -> what it takes; all of them are needed.
         steers: It changes the game or its time, and not only what this browser sees.
+        receivers: Name of the field with the ids of the entities that it is for; operators may give it to those of their team.
     """
 
     do: Callable[..., None]
     fields: Mapping[str, Rule] = field(default_factory=dict)
     steers: bool = True
+    receivers: str = ""
 
 
 def game_commands(live: Live) -> dict[str, Command]:
@@ -85,6 +97,15 @@ def game_commands(live: Live) -> dict[str, Command]:
         "reset": Command(live.reset, {"seed": ID}),
         "point": Command(point, {"pos": POINT}),
         "key": Command(live.publish_key, {"key": KEY}),
+        "order": Command(
+            live.order,
+            {"receivers": IDS, "network": str, "topic": str, "values": TYPED},
+            receivers="receivers",
+        ),
+        "set": Command(
+            live.set_parameter, {"entities": IDS, "path": str, "value": TYPED.rule}, receivers="entities"
+        ),
+        "remove": Command(live.remove, {"entities": IDS}, receivers="entities"),
     }
 
 

@@ -10,7 +10,9 @@ import numpy as np
 from tussle.declare import displays
 from tussle.declare.units import split_units, unit_of
 from tussle.engine.result import WorldResult
+from tussle.errors import clipped
 from tussle.view.entity import EntityState, Reading, ShownMessage
+from tussle.view.feed import TopicTraffic
 
 MAX_ITEMS = 6
 """Largest number of items of a list that are shown."""
@@ -119,6 +121,11 @@ def _component_names(fields: Sequence[str]) -> list[str]:
     parts = [name.rpartition("_") for name in fields]
     is_common = len({head for head, _, _ in parts}) == 1 and len(fields) > 1
     return [tail if is_common else name for name, (_, _, tail) in zip(fields, parts, strict=True)]
+
+
+def feed_rows(topics: Sequence[TopicTraffic]) -> list[tuple[str, int, str]]:
+    """Return topic, messages a second and the last message of each."""
+    return [(each.topic, each.rate, clipped(_message_row(each.last)[1])) for each in topics]
 
 
 def _message_row(message: ShownMessage) -> Row:

@@ -7,6 +7,8 @@ import json
 import math
 import time
 from collections import deque
+from collections.abc import Callable
+from dataclasses import asdict
 from functools import cached_property
 from typing import Any, Protocol
 
@@ -19,13 +21,14 @@ from tussle.record.run_file import mission_entry
 from tussle.view.curves import numbers_of
 from tussle.view.frame import Event, Frame
 from tussle.view.live import Live
+from tussle.view.page.access import DIRECT, OPERATE, WATCH, PageRole
 from tussle.view.page.chunks import FULL_HEALTH, UNIT, pack, step_of
 from tussle.view.page.commands import ID, MAX_ID, WANTED, Command, game_commands, read_command
 from tussle.view.page.document import event_rows
 from tussle.view.page.drawing import drawing_message
 from tussle.view.page.facts import mission_facts
 from tussle.view.page.failures import Failures
-from tussle.view.page.formatting import entity_sections, result_rows
+from tussle.view.page.formatting import entity_sections, feed_rows, result_rows
 from tussle.view.page.packing import message
 from tussle.view.series import OF_TEAMS, Changes, CurveName, StepSeries
 
@@ -63,13 +66,16 @@ class Reader:
 
     Attributes:
         socket: Its websocket.
+        role: What it may do.
         chosen: Id of the entity whose state it reads; 0 for nobody.
+        has_feed: It reads the messages of the game.
         wake: There is something to be sent.
     """
 
-    def __init__(self, socket: Socket) -> None:
-        self.socket = socket
+    def __init__(self, socket: Socket, role: PageRole) -> None:
+        self.socket, self.role = socket, role
         self.chosen = 0
+        self.has_feed = False
         self.wake = asyncio.Event()
         self.wake.set()
         self.frame_sent = self.drawn_sent = 0
@@ -86,6 +92,10 @@ class Reader:
     def choose(self, id: int) -> None:  # noqa: A002 - as the page calls it
         """Select the entity whose state is sent; 0 selects none."""
         self.chosen = id
+
+    def listen(self, is_on: bool) -> None:
+        """Send the messages of the game, or no more."""
+        self.has_feed = is_on
 
 
 class FramePublisher:
@@ -172,9 +182,9 @@ class FramePublisher:
 
     # -- one browser ----------------------------------------------------------------------------------------------------------------
 
-    async def serve(self, socket: Socket) -> None:
+    async def serve(self, socket: Socket, role: PageRole) -> None:
         """Send to a browser and take what it sends, until it goes."""
-        reader = Reader(socket)
+        reader = Reader(socket, role)
         self.readers.append(reader)
         sender = asyncio.create_task(self._send(reader))
         try:
@@ -199,29 +209,30 @@ class FramePublisher:
             while True:
                 await reader.wake.wait()
                 reader.wake.clear()
-                texts: list[
-                    str
-                ] = []  # sent outside `caught`: that a browser has gone is no failure of the page
                 if time.monotonic() >= reader.status_due:
                     reader.status_due = time.monotonic() + STATUS_PERIOD
-                    with self._failures.caught():
-                        texts.append(json.dumps(self._status(reader)))
-                await _send_all(socket, texts)
+                    await self._send_document(socket, lambda: self._status(reader))
                 while reader.past:
                     await socket.send_bytes(reader.past.popleft())
                 if reader.drawn_sent != self._n_drawn:
                     reader.drawn_sent = self._n_drawn
                     await socket.send_bytes(self._drawn)
                 # Before the frame: the page has the counts of what it shows.
-                with self._failures.caught():
-                    if curves := self._new_curves(reader):
-                        texts.append(json.dumps(curves))
-                await _send_all(socket, texts)
+                await self._send_document(socket, lambda: self._new_curves(reader))
                 if reader.frame_sent != self.n_made:
                     reader.frame_sent = self.n_made
                     await socket.send_bytes(self._frame)
         except (ConnectionError, RuntimeError):  # it has gone; `serve` hears of it too
             return
+
+    async def _send_document(self, socket: Socket, make: Callable[[], dict[str, Any] | None]) -> None:
+        """Make a document and send it. That a browser has gone is no failure of the page; one while it is made is."""
+        text = ""
+        with self._failures.caught():
+            if document := make():
+                text = json.dumps(document)
+        if text:
+            await socket.send_str(text)
 
     def _status(self, reader: Reader) -> dict[str, Any]:
         live, result = self._live, self._live.result()
@@ -237,6 +248,8 @@ class FramePublisher:
             "notes": [*live.notes, *self._drawing_notes, *self._failures.texts], "error": None if error is None else str(error),
             "metrics": [] if result is None else result_rows(result, live.teams), "events": self._new_events(reader),
             "entity": self._entity(reader), "refusal": refusal, "steers": self._may_steer(reader),
+            "role": {"kind": reader.role.kind, "team": reader.role.team},
+            "feed": feed_rows(live.messages()) if reader.has_feed else None,
         }  # fmt: skip
 
     def _new_events(self, reader: Reader) -> dict[str, Any]:
@@ -290,17 +303,49 @@ class FramePublisher:
         if state is None:
             return None
         quantities = [[name, unit] for name, (_, unit) in numbers_of(state).items()]
-        return {"id": state.id, "sections": entity_sections(state), "quantities": quantities}
+        orders = [asdict(kind) for kind in state.orders]
+        return {
+            "id": state.id,
+            "sections": entity_sections(state),
+            "quantities": quantities,
+            "orders": orders,
+        }
 
     # -- what they send ---------------------------------------------------------------------------------------------------------------
 
     def _may_steer(self, reader: Reader) -> bool:
-        return not self._one_steers or self.readers[0] is reader
+        """Whether a browser may do everything: of those of this role, where one steers the first."""
+        steering = [each for each in self.readers if each.role.kind == DIRECT]
+        return reader in (steering[:1] if self._one_steers else steering)
+
+    def _check_role(self, reader: Reader, command: Command, given: dict[str, Any]) -> None:
+        """Refuse a command that a browser may not give.
+
+        Raises:
+            ParameterError: It is for another role, or for an entity of another team.
+        """
+        if not command.steers or self._may_steer(reader):
+            return
+        role = reader.role
+        if role.kind != OPERATE:
+            raise ParameterError(
+                "this address is for watching" if role.kind == WATCH else "another browser steers this game"
+            )
+        if not command.receivers:
+            raise ParameterError(f"this address is for orders to team {role.team}")
+        frame = self._live.frame()
+        team = dict(zip(frame.id.tolist(), frame.team.tolist(), strict=True))
+        for who in given[command.receivers]:
+            if team.get(who) != role.team:
+                raise ParameterError(
+                    f"entity {who} is not of team {role.team}, to which this address gives orders"
+                )
 
     def _take(self, reader: Reader, text: Any) -> None:
         """Execute the command of a browser; ignore invalid ones."""
         commands = self._commands | {
             "choose": Command(reader.choose, {"id": ID}, steers=False),
+            "listen": Command(reader.listen, {"is_on": bool}, steers=False),
             "want": Command(lambda wanted: self._want(reader, wanted), {"wanted": WANTED}, steers=False),
             "history": Command(
                 lambda seconds: self._look_back(reader, seconds), {"seconds": Real(0.0, 1e9)}, steers=False
@@ -312,8 +357,7 @@ class FramePublisher:
                 if read is None:
                     return
                 command = commands[read[0]]
-                if command.steers and not self._may_steer(reader):
-                    raise ParameterError("another browser steers this game")
+                self._check_role(reader, command, read[1])
                 command.do(**read[1])
             except ParameterError as error:
                 self._refuse(reader, str(error))
@@ -337,8 +381,3 @@ class FramePublisher:
         past = [frames[step] for step in sorted(frames)]
         header = {"kind": "past", "epoch": live.epoch, "seconds": seconds}
         reader.past.append(message(header, pack(past[0].step, past, self._step)))
-
-
-async def _send_all(socket: WebSocketResponse, texts: list[str]) -> None:
-    while texts:
-        await socket.send_str(texts.pop(0))

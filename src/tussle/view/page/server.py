@@ -13,7 +13,17 @@ from typing import TYPE_CHECKING, Any, Self
 from tussle.errors import MissingExtraError
 from tussle.mission import Mission
 from tussle.view.live import Live
-from tussle.view.page.access import HEADERS, MAX_BROWSERS, MAX_BYTES, MAX_UNSENT, Access, bound_socket
+from tussle.view.page.access import (
+    HEADERS,
+    MAX_BROWSERS,
+    MAX_BYTES,
+    MAX_UNSENT,
+    OPERATE,
+    WATCH,
+    Access,
+    PageRole,
+    bound_socket,
+)
 from tussle.view.page.assemble import page_html
 from tussle.view.page.compare import Comparison
 from tussle.view.page.document import game_document, scenery_blobs
@@ -48,12 +58,14 @@ class Page:
         warp: Simulated seconds per second at which a recorded game begins; None is as fast as can be shown.
         is_paused: Whether a recorded game stands still at first.
         one_steers: Of a live game, only the browser that came first steers it; otherwise all do.
+        has_roles: A live game has further addresses: for watching only, and for orders to each of its teams.
 
     Attributes:
         game: The game.
         host: Where it is served.
         port: Its port.
         url: Its whole address, as typed on this machine.
+        addresses: Role -> address, with that of who may do everything.
         is_local: Only this machine can reach it.
         notes: What the user should know, one line each.
 
@@ -73,6 +85,7 @@ class Page:
         warp: float | None = 1.0,
         is_paused: bool = False,
         one_steers: bool = False,
+        has_roles: bool = False,
     ) -> None:
         _check_extra()
         self.game, self.host = game, host or LOOPBACK
@@ -99,8 +112,11 @@ class Page:
         bound = bound_socket(self.host, port)
         address, self.port = bound.getsockname()[:2]
         self.is_local = ipaddress.ip_address(address).is_loopback
-        self._access = Access(self.host, self.port)
-        self.url = self._access.url
+        roles = (
+            [PageRole(OPERATE, team) for team in game.teams] if has_roles and isinstance(game, Live) else []
+        )
+        self._access = Access(self.host, self.port, [*roles, PageRole(WATCH)] if roles else [])
+        self.url, self.addresses = self._access.url, self._access.addresses
         publisher = self.publisher
         self._server: WebServer | None = None
         with self._failures.caught():
@@ -133,7 +149,9 @@ class Page:
                 max_msg_size=MAX_BYTES, compress=False, timeout=1.0, writer_limit=MAX_UNSENT
             )
             await socket.prepare(request)
-            await self.publisher.serve(socket)
+            role = self._access.role_of(request.raw_path)
+            assert role is not None  # `_admit` has asked
+            await self.publisher.serve(socket, role)
             return socket
         if not name:
             return web.Response(text=self._html, content_type="text/html")

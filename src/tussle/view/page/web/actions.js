@@ -91,6 +91,7 @@ export function actionsOf(player) {
     anew: () => player.order('reset', { seed: Number(field('seed').value) }),
 
     quantities: () => player.quantities.toggle(),
+    feed: () => player.feed.toggle(),
     help: dialog('help'),
     info: dialog('info'),
     // Escape may have closed it while a key is down on its button.

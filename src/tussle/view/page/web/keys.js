@@ -37,6 +37,7 @@ const KEYS = [
   ['Live game', [
     [['p'], 'pick a point on the ground and send it to the plugins', 'pick'],
     [[';'], 'send a key to the plugins', 'customKey'],
+    [['f'], 'messages that plugins publish', 'feed'],
   ]],
   ['Page', [
     [['q'], 'quantities over time', 'quantities'],

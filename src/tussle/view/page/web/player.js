@@ -11,6 +11,8 @@ import { TRAIL_LENGTHS, TRAIL_OF_CHOSEN } from './trails.js';
 import { EventLine } from './events.js';
 import { LiveClock, RecordedClock } from './timeline.js';
 import { Panels } from './panels.js';
+import { MessagePanel } from './feed.js';
+import { OrderForm } from './orders.js';
 import { QuantityPanel } from './quantities.js';
 import { Steering } from './steering.js';
 import { Viewpoint } from './viewpoint.js';
@@ -47,6 +49,8 @@ export class Player {
     this.isShown = false;
     this.isPicking = false;
     this.isLost = false;
+    /** What takes a picked point. @type {((pos: number[]) => void) | null} */
+    this.takePoint = null;
     this.lookedBack = 0;
     /** @type {number | undefined} */
     this.looking = undefined;
@@ -77,6 +81,8 @@ export class Player {
     this.clock = layer instanceof Live ? new LiveClock(layer, source) : new RecordedClock(layer, page);
     this.events = new EventLine(layer, this.clock, (event) => this.jump(event));
     this.panels = new Panels(page, layer, this.hidden, () => this.look());
+    this.orders = new OrderForm(this);
+    this.feed = new MessagePanel(this);
     this.quantities = new QuantityPanel(this);
     this.steering = new Steering(this.canvas, this);
     drawn.labels = layer.mostAtOnce <= FEW.labels;
@@ -232,6 +238,8 @@ export class Player {
     this.picture.draw();
     this.panels.showTeams(clock.t);
     this.panels.showChosen(this.chosen, this.camera.mode, clock.t);
+    this.orders.show();
+    this.feed.show();
     this.quantities.show(clock.t);
     this.events.update(clock.t);
     clock.show(clock.t, clock.isPlaying, clock.speed);
@@ -292,20 +300,24 @@ export class Player {
     this.look();
   }
 
-  /** Begin, or end, to wait for a click on the ground. @param {boolean} isPicking */
-  pick(isPicking) {
+  /** Begin, or end, to wait for a click on the ground. @param {boolean} isPicking @param {((pos: number[]) => void) | null} take takes the point; by default plugins are told of it */
+  pick(isPicking, take = null) {
     if (!this.source.isLive) return;
     this.isPicking = isPicking;
+    this.takePoint = take;
     this.canvas.classList.toggle('is-picking', isPicking);
-    this.say(isPicking ? 'Click on the ground: plugins are told of it in the next step' : 'No point is picked');
+    this.say(isPicking ? `Click on the ground${take ? '' : ': plugins are told of it in the next step'}` : 'No point is picked');
   }
 
-  /** Tell the plugins of the ground at a pixel of the window. @param {number} x @param {number} y */
+  /** Tell the plugins, or who waits for it, of the ground at a pixel of the window. @param {number} x @param {number} y */
   pickAt(x, y) {
+    const take = this.takePoint;
     this.pick(false);
     const pos = this.picture.groundAt(x, y);
-    if (pos) this.order('point', { pos });
-    this.say(pos ? `Plugins are told of ${pos.map((c) => number(c, 1)).join(', ')} m` : 'There is no ground there');
+    const text = pos?.map((c) => number(c, 1)).join(', ');
+    if (pos && take) take(pos);
+    else if (pos) this.order('point', { pos });
+    this.say(!pos ? 'There is no ground there' : take ? `${text} m` : `Plugins are told of ${text} m`);
   }
 
   /** @param {GameEvent} event */

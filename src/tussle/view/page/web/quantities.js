@@ -44,6 +44,7 @@ export class QuantityPanel {
 
   toggle() {
     this.box.hidden = !this.box.hidden;
+    if (!this.box.hidden && !byId('feed').hidden) this.player.feed.toggle();
     this.player.look();
   }
 

@@ -44,9 +44,18 @@ export interface PageData {
 export interface Status {
   t: number; step: number; span: [number, number]; epoch: number; seed: number; isPaused: boolean; isOver: boolean; isSeeking: boolean;
   warp: number | null; reached: number; rate: number; notes: string[]; error: string | null; metrics: [string, string][];
-  events: { from: number; rows: EventRow[] }; refusal: string | null; steers: boolean;
-  entity: { id: number; sections: Section[]; quantities: [string, string][] } | null;
+  events: { from: number; rows: EventRow[] }; refusal: string | null; steers: boolean; role: { kind: 'direct' | 'operate' | 'watch'; team: number | null };
+  /** Topic, messages a second of the game, and the last message; null where it was not asked for. */
+  feed: [string, number, string][] | null;
+  entity: { id: number; sections: Section[]; quantities: [string, string][]; orders: OrderKind[] } | null;
 }
+
+/** A field of an order: components by name, or a single value; their units. */
+export interface OrderField {
+  name: string; kind: 'number' | 'whole' | 'flag' | 'entity' | 'text'; parts: string[]; units: string[]; is_list: boolean; doc: string; example: number[];
+}
+/** A message that plugins of an entity take, see orders.py. */
+export interface OrderKind { network: string; topic: string; message: string; plugins: string[]; doc: string; fields: OrderField[]; }
 
 /** Shapes of plugins, see drawing.py. */
 export interface ShapesHeader {

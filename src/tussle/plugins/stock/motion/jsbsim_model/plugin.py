@@ -259,6 +259,7 @@ class JSBSimAircraft(RigidBodyModel):
     def to_body(self, body: MotionBody) -> None:
         """Write the states, and end the worlds of aircraft that have failed."""
         super().to_body(body)
+        self.warn_of_tumbling(body)
         self._report(body)
 
     def commands(self, u: np.ndarray) -> np.ndarray:

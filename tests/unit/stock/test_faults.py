@@ -1,0 +1,233 @@
+"""Faults of sensors and actuators: on all vehicles and sensors that ship, when they begin and end, and what is refused."""
+
+from __future__ import annotations
+
+import inspect
+
+import numpy as np
+import pytest
+from test_radio_network import hears, is_near, n_heard, talks
+
+from tussle import Block, Mission, Simulation
+from tussle.api import Autonomy, Input, MotionModel, Output, Sensor
+from tussle.api.channels import COMMAND_CHANNELS, MEASURED_CHANNELS
+from tussle.errors import ParameterError, WiringError
+from tussle.plugins import stock
+from tussle.stock import (
+    GPS,
+    ActuatorFault,
+    FailingRadio,
+    NoisyState,
+    RigidBody6DOF,
+    SensorFault,
+    SingleIntegrator,
+    Still,
+)
+
+CLASSES = {c.__name__: c for c in map(stock.load, stock.manifest()) if not inspect.isabstract(c)}
+VEHICLES = {n: c for n, c in CLASSES.items() if issubclass(c, MotionModel) and not n.startswith("JSBSim")}
+"""JSBSim's need the files of an aircraft; their channels are in `test_the_tables_have_all_channels`."""
+STEERED = [n for n, c in VEHICLES.items() if any(not i.optional for i in c.inputs().values())]
+SENSORS = [
+    n for n, c in CLASSES.items()
+    if issubclass(c, Sensor) and c.grade == "portable" and n != "SensorFault" and any(not o.ragged for o in c.outputs().values())
+]  # fmt: skip
+
+
+def driver(channels, value):
+    """An autonomy that writes a number that rises by 1 in each step."""
+
+    def step(self, g):
+        for name in channels:
+            getattr(self, name)[:] = value + g.step_count
+
+    body = {name: Output(unit=COMMAND_CHANNELS[name]) for name in channels}
+    return type("Driver", (Autonomy,), {**body, "step": step, "__doc__": "Writes numbers."})()
+
+
+def reader(channels):
+    """An autonomy that reads numbers of sensors."""
+    body = {name: Input(unit=MEASURED_CHANNELS[name]) for name in channels}
+    return type("Reader", (Autonomy,), {**body, "step": lambda *_: None, "__doc__": "Reads numbers."})()
+
+
+def flight(*, end=5.0, seeds=1, count=1, **parts):
+    """A game of one block."""
+    block = Block(name="a", count=count, position=(3, 4, 50), **parts)
+    return Simulation(Mission(blocks=[block], dt=0.1, end=end), seeds=seeds)
+
+
+def test_the_tables_have_all_channels():
+    for cls in CLASSES.values():
+        if issubclass(cls, (MotionModel, Sensor)) and "Fault" not in cls.__name__:
+            columns = cls.inputs() if issubclass(cls, MotionModel) else cls.outputs()
+            known = COMMAND_CHANNELS if issubclass(cls, MotionModel) else MEASURED_CHANNELS
+            for column in columns.values():
+                for name, unit in zip(column.channels, column.units, strict=False):
+                    assert column.ragged or "ROS" in cls.__name__ or known[name] == unit
+
+
+@pytest.mark.parametrize("name", STEERED)
+def test_actuators_of_all_vehicles(name):
+    vehicle = VEHICLES[name]()
+    inputs = vehicle.active_inputs()
+    channels = [c for k in inputs for c in type(vehicle).inputs()[k].channels]
+    fault = ActuatorFault(channels=" ".join(channels), fault="reverse", start_after=0.2, duration=0.2)
+    sim = flight(autonomy=driver(channels, 0.01), controller=fault, motion=vehicle)
+    seen = []
+    for _ in range(5):
+        sim.step()
+        seen.append([sim.read(f"a.{name}.{k}")[0].ravel() for k in inputs])
+    for k in range(len(inputs)):
+        assert [float(row[k][0]) for row in seen] == [0.01, 1.01, -2.01, -3.01, 4.01]
+
+
+@pytest.mark.parametrize("name", SENSORS)
+def test_measurements_of_all_sensors(name):
+    """What an autonomy reads is altered by a bias, and nothing else is."""
+    sensor = CLASSES[name]()
+    channels = [c for o in type(sensor).outputs().values() if not o.ragged for c in o.channels]
+    plain = [c for c in channels if not c.startswith("belief_quat")]
+    motion = RigidBody6DOF() if name.startswith("RigidBody") else Still()
+    pilot = [driver(["thrust", "elevator", "aileron", "rudder"], 0.1)] if name.startswith("RigidBody") else []
+    sensors = [GPS(), sensor] if name == "SimpleINS" else [sensor]
+    fault = SensorFault(channels=" ".join(plain), fault="bias", value=2.5, start_after=0.25)
+    games = [
+        flight(autonomy=[*pilot, reader(plain)], motion=motion, sensor=list_)
+        for list_ in (sensors, [*sensors, fault])
+    ]
+    for _ in range(4):
+        for sim in games:
+            sim.step()
+        added = 0.0 if games[0].t[0] < 0.25 else 2.5
+        for channel in plain:
+            right, wrong = (float(sim.read(f"a.Reader.{channel}")[0].ravel()[0]) for sim in games)
+            assert wrong == right + added, channel
+        assert np.array_equal(games[0].read("a.pos")[0], games[1].read("a.pos")[0])
+
+
+@pytest.mark.parametrize(
+    ("fault", "expected"),
+    [
+        ("dropout", [0, 1, 7, 7, 7, 5]),
+        ("bias", [0, 1, 9, 10, 11, 5]),
+        ("freeze", [0, 1, 2, 2, 2, 5]),
+        ("delay", [0, 1, 0, 1, 2, 5]),
+        ("saturate", [0, 1, 1.5, 1.5, 1.5, 5]),
+        ("reverse", [0, 1, -2, -3, -4, 5]),
+    ],
+)
+def test_what_a_fault_does(fault, expected):
+    value = 1.5 if fault == "saturate" else 7.0
+    broken = ActuatorFault(
+        channels="velocity_x", passed="velocity_y, velocity_z", fault=fault, value=value, delay=2, start_after=0.2, duration=0.3
+    )  # fmt: skip
+    names = ["velocity_x", "velocity_y", "velocity_z"]
+    sim = flight(autonomy=driver(names, 0.0), controller=broken, motion=SingleIntegrator())
+    seen = []
+    for _ in range(6):
+        sim.step()
+        seen.append([float(sim.read(f"a.ActuatorFault.{n}_out")[0].ravel()[0]) for n in names])
+    assert [row[0] for row in seen] == expected
+    assert [row[1:] for row in seen] == [[k, k] for k in range(6)]
+
+
+def test_a_belief_that_is_late():
+    """The attitude can be late with the position; the truth goes on."""
+    belief = " ".join(c for c in MEASURED_CHANNELS if c.startswith("belief"))
+    exact = {f"{kind}_noise_{i}": (0, 0) for kind in ("pos", "vel") for i in range(3)}
+    sensors = [NoisyState(**exact), SensorFault(channels=belief, fault="delay", delay=3)]
+    names = ["velocity_x", "velocity_y", "velocity_z"]
+    sim = flight(autonomy=driver(names, 1.0), motion=SingleIntegrator(), sensor=sensors)
+    true, believed = [], []
+    for _ in range(8):
+        sim.step()
+        true.append(sim.read("a.pos")[0].ravel().copy())
+        believed.append(sim.read("a.NoisyState.belief_pos")[0].ravel().copy())
+    assert np.array_equal(believed[3:], true[:5])
+    assert not np.array_equal(believed[-1], true[-1])
+
+
+def test_faults_begin_at_random_at_their_rate():
+    broken = ActuatorFault(start_after="inf", failure_rate=0.5, duration=0.1)
+    names = ["velocity_x", "velocity_y", "velocity_z"]
+    parts = {"autonomy": driver(names, 1.0), "controller": broken, "motion": SingleIntegrator()}
+    sim, n = flight(count=500, seeds=[1, 2], **parts), 0
+    for _ in range(40):
+        sim.step()
+        n += int(sim.read("a.ActuatorFault.is_faulty")[0].sum())
+    mean = 2 * 500 * 40 * -np.expm1(-0.5 * 0.1)
+    assert abs(n - mean) < 4.0 * np.sqrt(mean)
+
+
+def test_some_entities_have_the_fault():
+    broken = ActuatorFault(probability=0.3, start_after=0.1)
+    names = ["velocity_x", "velocity_y", "velocity_z"]
+    sim = flight(count=1000, autonomy=driver(names, 1.0), controller=broken, motion=SingleIntegrator())
+    counts = []
+    for _ in range(3):
+        sim.step()
+        counts.append(int(sim.read("a.ActuatorFault.is_faulty")[0].sum()))
+    assert counts[0] == 0
+    assert abs(counts[1] - 300) < 4.0 * np.sqrt(1000 * 0.3 * 0.7)
+    assert counts[2] == counts[1]
+
+
+def test_what_is_refused():
+    with pytest.raises(ParameterError, match=r"there is no channel 'sped' \(did you mean 'speed'\?\)"):
+        ActuatorFault(channels="sped")
+    with pytest.raises(ParameterError, match="channel 'speed' is written twice"):
+        ActuatorFault(channels="speed, speed")
+    with pytest.raises(ParameterError, match="names no channel"):
+        SensorFault(channels="")
+    with pytest.raises(ParameterError, match=r"an attitude is the channels .* and takes freeze or delay"):
+        SensorFault(channels="belief_quat_w belief_quat_x belief_quat_y belief_quat_z", fault="bias")
+    with pytest.raises(WiringError, match="alters channel 'belief_pos_x', which no sensor before it writes"):
+        flight(motion=Still(), sensor=[SensorFault(), NoisyState()])
+    with pytest.raises(
+        WiringError, match="in every step, but NoisyState writes it at 5 Hz; give both the same rate"
+    ):
+        flight(motion=Still(), sensor=[NoisyState(rate=5), SensorFault()])
+    pilot, broken = driver(["velocity_x"], 0.0), ActuatorFault(channels="velocity_x")
+    with pytest.raises(WiringError, match="no plugin writes channel 'velocity_y' for SingleIntegrator"):
+        flight(autonomy=pilot, controller=broken, motion=SingleIntegrator())
+
+
+def radio_game(n, last=10**6, **radio):
+    """Worlds of two entities, of which one sends, at their end."""
+    blocks = [talks("a", 0.0, network="FailingRadio", last=last), hears("b", 50.0, network="FailingRadio")]
+    mission = Mission(blocks=blocks, networks=[FailingRadio(**radio)], end=1.0, dt=0.1)
+    sim = Simulation(mission, seeds=range(1, n + 1))
+    return sim, [each.metrics["FailingRadio"] for each in sim.run()]
+
+
+def test_radios_are_out_in_bursts():
+    """The chance that both of two messages arrive is that of Gilbert's model, for two radios that are out half of the time."""
+    n, both = 800, (0.5 * (0.5 + 0.5 * np.exp(-2.0 * 0.1))) ** 2
+    sim, found = radio_game(n, last=2, failure_rate=1.0, outage=1.0)
+    heard = np.array([each["delivered"] for each in found])
+    assert is_near(heard.sum(), 0.25, 2 * n)
+    assert is_near((heard == 2).sum(), both, n)
+    assert n_heard(sim, "b") == heard.sum()
+    assert (sum(each["lost_outage"] for each in found)) == 2 * n - heard.sum()
+
+
+def test_jamming_silences_a_world_for_some_time():
+    _, (found,) = radio_game(1, failure_rate=0.0, jam_start=0.35, jam_duration=0.4)
+    assert (found["delivered"], found["lost_jammed"]) == (6, 4)
+    assert radio_game(1, failure_rate=0.0)[1][0]["delivered"] == 10
+    assert radio_game(1, failure_rate=0.0, range=49.0)[1][0]["sent"] == 0
+
+
+def test_a_radio_does_not_depend_on_who_sends_in_other_worlds():
+    """Worlds of a stack send at different times: what is drawn for a world when only others send would change it."""
+    blocks = [talks("a", 0.0, network="FailingRadio"), hears("b", 50.0, network="FailingRadio")]
+    mission = Mission(blocks=blocks, networks=[FailingRadio(failure_rate=1.0)], end=2.0, dt=0.1)
+    with Simulation(mission, [5]) as alone, Simulation(mission, [5, 6]) as stack:
+        alone.step(2)
+        stack.step(2)
+        for sim in (alone, stack):  # in world 0, the sender is gone for some steps: nobody sends there
+            sim.write("a.health", [[0.0]] if sim is alone else [[0.0], [1.0]])
+        alone.step(5)
+        stack.step(5)
+        assert alone.state_hash() == stack.state_hash(0)

@@ -1,0 +1,135 @@
+"""What each address of a page may do: everything, orders to a team, or watching."""
+
+import re
+
+import numpy as np
+import pytest
+from page_client import PageClient
+
+from tussle import Block, Mission, Simulation
+from tussle.stock import GoTo, SingleIntegrator
+from tussle.view import Live
+from tussle.view.page.access import OPERATE, WATCH, PageRole
+from tussle.view.page.server import Page
+
+ORDER = {"network": "LocalNetwork", "topic": "Waypoint", "values": {"pos": [50, 0, 0]}}
+EVERYTHING = [
+    ("pause", {}), ("resume", {}), ("step", {"n": 3}), ("seek", {"t": 0.0}), ("warp", {"value": 4.0}), ("faster", {}), ("slower", {}),
+    ("reset", {"seed": 9}), ("point", {"pos": [1.0, 2.0, 0.0]}), ("key", {"key": ";"}), ("order", {"receivers": [1], **ORDER}),
+    ("set", {"entities": [1], "path": "GoTo.speed", "value": 3.0}), ("remove", {"entities": [1]}),
+]  # fmt: skip
+
+
+@pytest.fixture
+def page():
+    blocks = [
+        Block(name=name, team=team, count=2, autonomy=GoTo(), motion=SingleIntegrator(max_speed=20.0), position=(0, 50 * team, 0))
+        for name, team in (("red", 1), ("blue", 2))
+    ]  # fmt: skip
+    with (
+        Simulation(Mission(blocks=blocks, end=60.0, dt=0.1), 3) as simulation,
+        Live(simulation, is_paused=True) as live,
+        Page(live, has_roles=True) as page,
+    ):
+        live.step(2)
+        assert live.settle()
+        yield live, page
+        assert page.error is None
+
+
+def state(live):
+    assert live.settle()
+    return (
+        live.simulation.state_hash(),
+        live.step_number,
+        len(live.injections),
+        live.is_paused,
+        live.warp,
+        live.seed,
+    )
+
+
+def refused(client, name, fields):
+    """The reason for which a command was refused; of several in a second, only the first is told."""
+    del client.refusals[:]
+
+    def told():
+        client.order(name, **fields)
+        return client.refusals
+
+    return client.wait(told)[0]
+
+
+def test_each_role_has_an_address_of_its_own(page):
+    _, page = page
+    assert [str(role) for role in page.addresses] == ["direct", "operate team 1", "operate team 2", "watch"]
+    assert page.addresses[PageRole()] == page.url
+    tokens = {
+        re.fullmatch(r"http://127\.0\.0\.1:\d+/([0-9a-f]{32})", url)[1] for url in page.addresses.values()
+    }
+    assert len(tokens) == 4
+
+
+@pytest.mark.parametrize("command", EVERYTHING, ids=lambda command: command[0])
+@pytest.mark.parametrize("role", [PageRole(WATCH), PageRole(OPERATE, 2)], ids=str)
+def test_nothing_else_is_done_from_the_other_addresses(page, role, command):
+    live, page = page
+    before = state(live)
+    with PageClient(page.addresses[role]) as client:
+        client.wait(lambda: client.status and client.n_frames)
+        assert not client.status["steers"]
+        assert client.status["role"] == {"kind": role.kind, "team": role.team}
+        reason = refused(client, *command)
+        is_order = bool({"receivers", "entities"} & set(command[1]))
+        expected = (
+            "this address is for watching" if role.kind == WATCH else "this address is for orders to team 2"
+        )
+        assert reason == (
+            "entity 1 is not of team 2, to which this address gives orders"
+            if is_order and role.team
+            else expected
+        )
+        client.order("choose", id=3)
+        client.wait(lambda: client.status["entity"])
+    assert state(live) == before
+
+
+def test_an_operator_gives_orders_to_the_own_team(page):
+    live, page = page
+    with PageClient(page.addresses[PageRole(OPERATE, 2)]) as client:
+        client.wait(lambda: client.status)
+        client.order("order", receivers=[3, 4], **ORDER)
+        client.wait(lambda: len(live.injections) == 1)
+        assert refused(client, "order", {"receivers": [3, 1], **ORDER}).startswith(
+            "entity 1 is not of team 2"
+        )
+        assert refused(client, "order", {"receivers": [77], **ORDER}).startswith("entity 77 is not of team 2")
+        client.order("set", entities=[4], path="GoTo.speed", value=3.0)
+        client.wait(lambda: len(live.injections) == 2)
+    live.step(3)
+    assert live.settle()
+    assert not live.notes
+    goals, _ = live.simulation.read("blue.GoTo.goal")
+    assert (goals[0] == (50, 0, 0)).all()
+    assert np.array_equal(live.simulation.read("blue.GoTo.speed")[0][0], [10, 3])
+    assert not live.simulation.read("red.GoTo.is_told")[0].any()
+
+
+def test_one_steers_is_the_first_of_those_who_may(page):
+    live, _ = page
+    with (
+        Page(live, has_roles=True, one_steers=True) as one,
+        PageClient(one.addresses[PageRole(WATCH)]) as watcher,
+        PageClient(one.url) as first,
+        PageClient(one.url) as second,
+    ):
+        first.wait(lambda: first.status.get("steers"))
+        second.wait(lambda: second.status and not second.status["steers"])
+        watcher.wait(lambda: watcher.status and not watcher.status["steers"])
+        assert refused(second, "step", {"n": 1}) == "another browser steers this game"
+
+
+def test_without_roles_there_is_one_address(page):
+    live, _ = page
+    with Page(live) as plain:
+        assert list(plain.addresses.values()) == [plain.url]
