@@ -9,6 +9,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
+from importlib import import_module
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
@@ -451,6 +452,22 @@ class Simulation:
         head = ("seed", "t [s]", "end", *(block.name for block in blocks))
         title = f"Simulation {self.mission.name}"
         return page(title, self._facts(), table(head, ((seed, t, end, *n) for seed, t, end, n in rows)))
+
+    def view(self, world: int = 0, *, height: int = 520) -> Any:
+        """Return an interactive 3D view for a notebook, which plays the simulation, paused at first; see `tussle.view.notebook`.
+
+        Nothing else may step the simulation until `stop()` of the view.
+
+        Args:
+            world: Number of the world that is shown.
+            height: Height of the view [pixels].
+
+        Raises:
+            MissingExtraError: anywidget is not installed.
+            ParameterError: A value is not allowed.
+        """
+        # By name: the engine knows nothing of views, which are above it.
+        return import_module("tussle.view.notebook").view_simulation(self, world, height)
 
     def close(self) -> None:
         """Release threads and all objects that plugins hold outside the arrays. Called at the end of `with`; may be called twice."""

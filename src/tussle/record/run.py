@@ -220,6 +220,23 @@ class Run:
             counted(self.trajectory_table.num_rows, "state"), f"ended by {ends}" if ends else "", state,
         )  # fmt: skip
 
+    def view(self, world: int = 0, *, height: int = 520) -> Any:
+        """Return an interactive 3D view for a notebook, with a time line; see `tussle.view.notebook`.
+
+        Args:
+            world: Number of the world that is shown.
+            height: Height of the view [pixels].
+
+        Raises:
+            MissingExtraError: The run is too large for a cell, and anywidget is not installed.
+            ParameterError: The height is not allowed.
+            RecordError: The run does not have the world.
+            ViewError: The run holds no states.
+        """
+        # By name: views are above recordings.
+        recording = import_module("tussle.view.recording").Recording(self.path, world)
+        return import_module("tussle.view.notebook").view_run(recording, height)
+
     def _repr_html_(self) -> str:
         worlds = self.info.get("worlds", ())
         rows = (

@@ -17,25 +17,30 @@ MAIN = "main.js"
 """The module that starts the page; it and those that it imports are the script."""
 SERVED = "served.js"
 """The module that asks the page's server; a file does not hold it."""
+FRAMED = "framed.js"
+"""The module that asks the notebook which shows the page."""
 IMPORT = re.compile(r"^import [^;]*'\./([\w.]+)';\n", re.MULTILINE)
 DOC_COMMENT = re.compile(r"^ */\*\*(?:(?!\*/).)*\*/\n", re.MULTILINE | re.DOTALL)
 EXPORT = re.compile(r"^export (?=\w)", re.MULTILINE)
 NO_MARKUP = str.maketrans({c: f"\\u{ord(c):04x}" for c in "<>&"})
 
 
-def page_html(document: Mapping[str, Any], blobs: Mapping[str, bytes] | None = None) -> str:
+def page_html(
+    document: Mapping[str, Any], blobs: Mapping[str, bytes] | None = None, entry: str = SERVED
+) -> str:
     """Return the HTML text of the page.
 
     Args:
         document: Data that the page needs before its first picture.
-        blobs: Data by name, for a file; None for a page that asks its server.
+        blobs: Data by name, for a file; None for a page that asks for them.
+        entry: The module that asks for them.
     """
-    script = script_text([MAIN] if blobs is not None else [SERVED, MAIN])
+    script = script_text([MAIN] if blobs is not None else [entry, MAIN])
     style = web_text("page.css")
     # Nothing runs but this very script: what got in as text cannot.
     policy = (
         f"default-src 'none'; script-src '{_hash(script)}'; style-src '{_hash(style)}'; img-src data:; "
-        f"connect-src '{'none' if blobs is not None else 'self'}'; base-uri 'none'; form-action 'none'"
+        f"connect-src '{'none' if blobs is not None or entry != SERVED else 'self'}'; base-uri 'none'; form-action 'none'"
     )
     parts = {
         "policy": policy,

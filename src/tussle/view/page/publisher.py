@@ -10,7 +10,7 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import asdict
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -32,8 +32,16 @@ from tussle.view.page.formatting import entity_sections, feed_rows, result_rows
 from tussle.view.page.packing import message
 from tussle.view.series import OF_TEAMS, Changes, CurveName, StepSeries
 
-if TYPE_CHECKING:
-    from aiohttp.web import WebSocketResponse
+
+class Socket(Protocol):
+    """A connection to a browser: aiohttp's websocket, or a cell of a notebook."""
+
+    @property
+    def closed(self) -> bool: ...
+    async def receive(self) -> Any: ...
+    async def send_str(self, data: str) -> None: ...
+    async def send_bytes(self, data: bytes) -> None: ...
+
 
 PERIOD = 1.0 / 30.0
 """Least time between two frames [s]."""
@@ -64,7 +72,7 @@ class Reader:
         wake: There is something to be sent.
     """
 
-    def __init__(self, socket: WebSocketResponse, role: PageRole) -> None:
+    def __init__(self, socket: Socket, role: PageRole) -> None:
         self.socket, self.role = socket, role
         self.chosen = 0
         self.has_feed = False
@@ -174,7 +182,7 @@ class FramePublisher:
 
     # -- one browser ----------------------------------------------------------------------------------------------------------------
 
-    async def serve(self, socket: WebSocketResponse, role: PageRole) -> None:
+    async def serve(self, socket: Socket, role: PageRole) -> None:
         """Send to a browser and take what it sends, until it goes."""
         reader = Reader(socket, role)
         self.readers.append(reader)
@@ -217,9 +225,7 @@ class FramePublisher:
         except (ConnectionError, RuntimeError):  # it has gone; `serve` hears of it too
             return
 
-    async def _send_document(
-        self, socket: WebSocketResponse, make: Callable[[], dict[str, Any] | None]
-    ) -> None:
+    async def _send_document(self, socket: Socket, make: Callable[[], dict[str, Any] | None]) -> None:
         """Make a document and send it. That a browser has gone is no failure of the page; one while it is made is."""
         text = ""
         with self._failures.caught():

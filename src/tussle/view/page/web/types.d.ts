@@ -28,7 +28,7 @@ export interface SceneryData {
 
 /** The document: what the page is told at once, see document.py, recorded.py and publisher.py. */
 export interface PageData {
-  source: 'embedded' | 'range' | 'socket'; generator: string; title: string; blocks: Block[]; teams: Team[]; models: Record<string, Mesh>;
+  source: 'embedded' | 'range' | 'socket' | 'framed' | 'framedLive'; generator: string; title: string; blocks: Block[]; teams: Team[]; models: Record<string, Mesh>;
   scenery: SceneryData; opening: { position: number[] | null; target: number[] | null; mode: Mode; follow: number } | null;
   reach: number; scale: number; hasTrails: boolean; notes: string[]; facts: [string, string][]; idShift: number;
   isComplete: boolean; attitudeUnit: number; healthSteps: number;
