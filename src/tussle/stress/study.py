@@ -25,8 +25,9 @@ from tussle.batch.variables import Variable
 from tussle.batch.varied import as_variables, variable_entry
 from tussle.documents import Whole, check_argument, json_text
 from tussle.engine.simulation import Simulation
-from tussle.errors import ParameterError, TussleError
+from tussle.errors import BatchError, ParameterError, TussleError
 from tussle.mission import Mission, to_xml
+from tussle.mission.effects import exactly
 from tussle.numeric import total
 from tussle.record.run_file import plain, put_whole, versions
 from tussle.stress.chances import Chance, chances
@@ -279,7 +280,7 @@ class Stress:
             how: `executor`, `processes`, `stack` and `on_game`, as for `GamePlayer`.
 
         Raises:
-            BatchError: A game has failed with an error, or the directory holds another study.
+            BatchError: A game has failed with an error, the directory holds another study, or the mission file has changed meanwhile.
             MissingExtraError: Optuna or cmaes is not installed.
             ParameterError: Nothing varies, no values can be played, or an argument is not allowed.
         """
@@ -294,9 +295,20 @@ class Stress:
         self.check()
         self._check_effects()
         with self._ledger(directory) as ledger:
+            player = self._player(ledger, how)
+
+            def play(games: Sequence[StressGame]) -> list[Played]:
+                if any(
+                    exactly(b.missions_at([{}])[0]) != exactly(b.mission) for b in (self.batch, *self.others)
+                ):
+                    raise BatchError(
+                        f"{self.batch.name}: the mission has changed during the search; games before are kept"
+                    )
+                return player.play(games)
+
             found = search(
-                self._player(ledger, how).play, self._refusal, self.variables, by, games,
-                math.inf if failures is None else failures, self.first_seed, self.mission.steps, bool(self.others),
+                play, self._refusal, self.variables, by, games, math.inf if failures is None else failures,
+                self.first_seed, self.mission.steps, bool(self.others),
             )  # fmt: skip
             tried = {"games": len(found.games), "failed": found.n_failed, "refused": len(found.refused)}
             self._write(ledger, [game.played for game in found.failures], tried)

@@ -90,6 +90,15 @@ def test_a_search_goes_on_where_it_was_stopped_and_does_not_depend_on_processes(
     assert verdicts(again) == verdicts(result)
 
 
+def test_a_mission_that_is_edited_meanwhile_ends_the_search(tmp_path):
+    file = tmp_path / "pads.xml"
+    file.write_text((EXAMPLE / "pads.xml").read_text())
+    study = Stress(file, NEAR, vary=VARY, settings={"run.end": 2}, plugin_files=[PLUGIN])
+    edited = file.read_text().replace("<y>8</y>", "<y>9</y>")
+    with pytest.raises(BatchError, match="changed during the search"):
+        study.search(64, processes=1, on_game=lambda _: file.write_text(edited))
+
+
 def test_samplers_differ_and_repeat():
     games = {name: verdicts(pads().search(64, name, processes=1)) for name in ("cmaes", "tpe", "random")}
     assert len({str(g) for g in games.values()}) == 3
