@@ -11,7 +11,7 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -39,6 +39,7 @@ from tussle.engine.simulation import Simulation
 from tussle.errors import BatchError, ParameterError, PluginError
 from tussle.mission import Loaded, Mission, PluginFile, read_mission
 from tussle.mission.effects import exactly
+from tussle.notebook_bar import Show, notebook_bar
 from tussle.palette import team_colours
 from tussle.record.run_file import versions
 
@@ -432,7 +433,7 @@ class Batch:
             target: Play what it takes to find the smallest value that reaches a target, such as "Guard.share >= 0.95"; see `Question`.
             over: Name of the variable whose smallest value the target needs; None for the first range, or the first choice of numbers.
             command: The command that `batch.json` names.
-            on_progress: Called after each finished run, and several times a second.
+            on_progress: Called after each finished run, and several times a second; None shows a bar in notebooks.
 
         Returns:
             The results.
@@ -447,11 +448,20 @@ class Batch:
         from tussle.batch.sequential import rule_of
 
         rule = rule_of(until, target, over)
-        if directory is None:
-            return play_in_memory(self, executor, rule, on_progress)
-        return play_in_directory(
-            self, Path(directory), executor, rule, list(command or sys.argv), on_progress
-        )
+        with notebook_bar(self.name) as show:
+            if show is not None and on_progress is None:
+                on_progress = partial(_show_runs, show, rule is None)
+            if directory is None:
+                return play_in_memory(self, executor, rule, on_progress)
+            return play_in_directory(
+                self, Path(directory), executor, rule, list(command or sys.argv), on_progress
+            )
+
+
+def _show_runs(show: Show, is_whole: bool, progress: Progress) -> None:
+    """Show progress in a notebook; where a rule ends the batch early, it is not known how many runs there will be."""
+    failed = f", {progress.n_failed} failed" if progress.n_failed else ""
+    show(progress.n_done + progress.under_way, progress.n_runs if is_whole else math.inf, f"runs{failed}")
 
 
 def check_quantity(

@@ -33,6 +33,7 @@ from tussle.errors import MissionError, ParameterError, PluginError
 from tussle.mission import GivenMission, Mission, mission_of
 from tussle.mission.rekeys import Rekeys
 from tussle.mission.spec import SHUFFLED
+from tussle.notebook_bar import notebook_bar
 from tussle.record.inputs import COLUMN, ExternalInput, fields_of, of_message
 
 if TYPE_CHECKING:
@@ -183,17 +184,20 @@ class Simulation:
         raise error.with_traceback(None) from error.cause
 
     def run(self, until: float | None = None) -> list[WorldResult]:
-        """Step until all worlds have ended or reached the time `until` [s]. Waits while paused.
+        """Step until all worlds have ended or reached the time `until` [s]. Waits while paused. In a notebook, a bar shows the progress.
 
         Returns:
             The result of each world so far.
         """
-        state = self.state
-        while state.n_running:
-            if until is not None and float(self.t[state.running].min()) >= until - 1e-6 * self.mission.dt:
-                break
-            self._resumed.wait()
-            self._step()
+        state, end = self.state, self.mission.end if until is None else until
+        with notebook_bar(self.mission.name) as show:
+            while state.n_running:
+                if until is not None and float(self.t[state.running].min()) >= until - 1e-6 * self.mission.dt:
+                    break
+                self._resumed.wait()
+                self._step()
+                if show is not None:
+                    show(float(self.t.max()), end, "s")
         return self.result()
 
     def run_until(self, condition: Callable[[Simulation], bool]) -> None:

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from tussle.errors import MissingExtraError, ParameterError, listed
+from tussle.notebook_bar import Show, notebook_bar
 from tussle.rl.actor_critic import ActorCritic
 from tussle.rl.policy_file import write_policy
 from tussle.rl.settings import Settings
@@ -282,13 +283,17 @@ class Trainer:
                 role.optimizer.step()
 
     def train(self, minutes: float, tell: Callable[[dict[str, float]], bool]) -> None:
-        """Train until `minutes` are over, those before a checkpoint included; at least one update.
+        """Train until `minutes` are over, those before a checkpoint included; at least one update. In a notebook, a bar shows the progress.
 
         Args:
             minutes: Wall time without evaluations [min].
             tell: Called after each update with the new line of the curve, by its columns, and after an evaluation with "low" and "high",
                 the ends of the 95 % interval of "evaluated", the mean return; ends the training where it returns true.
         """
+        with notebook_bar("training") as show:
+            self._train(minutes, tell, show)
+
+    def _train(self, minutes: float, tell: Callable[[dict[str, float]], bool], show: Show | None) -> None:
         began, before = time.monotonic(), self.minutes
         is_due, every = True, self.settings.evaluate_every
         while is_due:
@@ -301,6 +306,8 @@ class Trainer:
                 [self.minutes, float(self.n_decisions), float(self.n_episodes), episode_return, reward]
             )
             line = dict(zip(CURVE, self.curve[-1], strict=True))
+            if show is not None:
+                show(self.minutes, minutes, f"min, return {episode_return:.2f}")
             if every and len(self.curve) % every == 0:
                 paused = time.monotonic()
                 line |= self._evaluated()

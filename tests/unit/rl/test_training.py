@@ -72,6 +72,17 @@ def trainer_of(tmp_path):
     torch.set_num_threads(before)
 
 
+def test_training_shows_a_bar_in_a_notebook(trainer_of, monkeypatch):
+    shown = []
+    monkeypatch.setattr("tussle.notebook_bar.MIN_DURATION", 0.0)
+    monkeypatch.setattr(
+        "tussle.notebook_bar._publisher", lambda: lambda data, **_: shown.append(data["text/plain"])
+    )
+    trainer_of(PredatorsAndPrey(time_limit=3.0)).train(1e-9, lambda line: False)
+    assert any(text.startswith("training: ") and "min, return" in text for text in shown)
+    assert shown[-1] == ""
+
+
 def test_each_role_has_a_policy_that_flies(trainer_of):
     trainer = trainer_of(PredatorsAndPrey(time_limit=20.0), "tussle/PredatorsAndPrey-v0")
     assert list(trainer.roles) == ["prey", "keepers", "switchers"]
