@@ -42,6 +42,7 @@ class Notebook:
         traits = {"html": widget.html, "height": widget.height}
         page.evaluate("(traits) => { window.traits = traits; window.show(); }", traits)
         self.frame = page.frames[-1]
+        self.frame.wait_for_url("about:srcdoc", wait_until="commit")  # it begins as an empty page
 
     def _receive(self, text):
         if self.is_kernel_there:
@@ -71,6 +72,7 @@ def test_a_recorded_run_is_whole_in_its_cell(folder, watched):
     page = watched("nothing")
     page.set_content(f'<link rel="icon" href="data:,">{load_run(folder).view(height=400)._repr_html_()}')
     frame = page.frames[-1]
+    frame.wait_for_url("about:srcdoc", wait_until="commit")
     for _ in range(1500):
         if frame.evaluate("() => Boolean(window.player && player.isReady && player.ids.length)"):
             break

@@ -150,22 +150,69 @@ def test_orders_are_carried_out_and_belong_to_the_game(game):
     step(live, 2)
     assert column(live, "runner.Runner.told").tolist() == [[3, 1.5, -2, 3, 1, 5, 5], [0] * 7]
 
-    tab.locator("#order").select_option("remove")
+    # One more of its block, on the ground that is picked.
+    tab.locator("#order").select_option(label="Add one to runner")
+    watched.button("Send")
+    watched.wait("document.querySelector('#said').innerText.startsWith('position: x, y, z')")
+    watched.button("Point on the ground")
+    tab.mouse.click(500, 330)
+    watched.wait("document.querySelectorAll('#orders fieldset input')[2].value !== ''")
+    x, y, z = (float(tab.get_by_label(f"position {part}").input_value()) for part in "xyz")
     watched.button("Send")
     watched.until(lambda: len(live.injections) == 5 and live.settle())
+    step(live, 2)
+    frame = live.frame()
+    assert frame.id.tolist() == [1, 2, 3, 4, 5, 6]
+    assert frame.block[-1] == 1
+    assert np.allclose(frame.pos[-1], (x, y, z))
+
+    tab.locator("#order").select_option("remove")
+    watched.button("Send")
+    watched.until(lambda: len(live.injections) == 6 and live.settle())
     step(live, 2)
     assert 4 not in live.frame().id
     watched.wait("document.querySelector('#orders').hidden")
 
     there = live.simulation.state_hash()
     live.seek(0.1)
-    step(live, 10)
+    step(live, 12)
     assert live.simulation.state_hash() == there
     recorder.flush()
     with Simulation(mission(), 3) as again:
         again.play_inputs(load_inputs(recorder.directory))
-        again.step(11)
+        again.step(13)
         assert again.state_hash() == there
+
+
+def test_a_route_is_drawn_in_one_stroke(game):
+    _, watched, _ = game
+    tab = watched.tab
+    choose(watched, 5)
+    tab.locator("#order").select_option("0")
+    way = tab.get_by_label("way", exact=True)
+    way.fill("1 2 3")
+    corners = [(350, 300), (500, 300), (500, 420)]
+    watched.button("Draw a line")
+    tab.mouse.move(*corners[0])
+    tab.mouse.down()
+    for corner in corners:
+        tab.mouse.move(*corner, steps=15)
+    tab.mouse.up()
+    watched.wait("document.querySelector('#orders textarea').value.split('\\n').length > 1")
+    drawn = way.input_value().split("\n")
+
+    # The same as the corners that are picked one by one: the view has not turned, and the points between are gone.
+    way.fill("1 2 3")
+    for n, corner in enumerate(corners, 2):
+        watched.button("Add a point on the ground")
+        tab.mouse.click(*corner)
+        watched.wait(f"document.querySelector('#orders textarea').value.split('\\n').length === {n}")
+    assert way.input_value().split("\n") == drawn
+
+    watched.button("Draw a line")
+    tab.mouse.click(*corners[0])
+    watched.wait("document.querySelector('#said').innerText.startsWith('No line is drawn')")
+    assert way.input_value().split("\n") == drawn
 
 
 def test_the_messages_of_the_game_are_shown_while_they_are_asked_for(game):
@@ -179,7 +226,7 @@ def test_the_messages_of_the_game_are_shown_while_they_are_asked_for(game):
     live.step(15)
     assert live.settle()
     watched.wait(f"document.querySelector('#feed li')?.innerText.includes('{10 * runners}/s')")
-    assert "5: text 0 places" in tab.locator("#feed li p").inner_text()
+    assert "6: text 0 places" in tab.locator("#feed li p").inner_text()
     assert "GlobalNetwork/TextMessage" in tab.locator("#feed li b").inner_text()
     tab.locator("#topics").fill("waypoint")
     watched.wait("document.querySelectorAll('#feed li').length === 0")

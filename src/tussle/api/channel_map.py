@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from functools import cache
 from typing import Any, NamedTuple
 
-from tussle.api.channels import DRIVEN_CHANNELS
+from tussle.api.channels import CHANNEL_UNITS
 from tussle.declare import texts
 from tussle.declare.columns import Param
 from tussle.errors import ParameterError, listed, nearest_name
@@ -41,9 +41,9 @@ def channel_rows(text: str) -> tuple[ChannelRow, ...]:
     found = []
     for row in texts.rows(text):
         channel, _, rest = row.replace(",", " ").strip().partition(" ")
-        if channel not in DRIVEN_CHANNELS:
-            near = nearest_name(channel, DRIVEN_CHANNELS)
-            raise ParameterError(f"there is no channel {channel!r}{near}; {listed(DRIVEN_CHANNELS)}")
+        if channel not in CHANNEL_UNITS:
+            near = nearest_name(channel, CHANNEL_UNITS)
+            raise ParameterError(f"there is no channel {channel!r}{near}; {listed(CHANNEL_UNITS)}")
         number, *limits = texts.row(rest, [(name, "", "") for name in NUMBERS])
         if number != int(number) or number < 0.0:
             raise ParameterError(

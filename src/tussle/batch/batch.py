@@ -84,6 +84,9 @@ class Batch:
             its time. All games are then played in other processes of this machine.
         options: Further options of `read_mission`.
 
+    Attributes:
+        reading: All options of `read_mission`.
+
     Raises:
         ParameterError: A variable or a number is not allowed.
         MissionError: There is no such mission, or it cannot be played at one of the points.
@@ -115,9 +118,9 @@ class Batch:
         for file in self.plugin_files:
             file.load()
         self.variables = as_variables(vary)
-        self._options = {**options, "plugin_files": tuple(plugin_files)}
+        self.reading = {**options, "plugin_files": tuple(plugin_files)}
         if isinstance(mission, (str, Path)):
-            self.variables = with_whole_numbers(mission, self.settings, self.variables, **self._options)
+            self.variables = with_whole_numbers(mission, self.settings, self.variables, **self.reading)
         self.sample, self.sample_seed = sample, sample_seed
         if points is not None and self.variables:
             raise ParameterError(
@@ -144,7 +147,7 @@ class Batch:
         self.missions = list(self._missions(self.plan.points))
         if isinstance(self.source, (str, Path)) and self.variables:
             points = list(map(self._settings, self.plan.points))
-            check_variables(self.source, self.settings, points, **self._options)
+            check_variables(self.source, self.settings, points, **self.reading)
         self.design_points, package = group_points(self.missions, self.plugin_files)
         self.package = replace(package, run_timeout=run_timeout)
 
@@ -152,7 +155,7 @@ class Batch:
         """The mission file as it stands without any varied value; None for a mission made in Python."""
         if not isinstance(self.source, (str, Path)):
             return None
-        return read_mission(self.source, self.settings, **self._options)
+        return read_mission(self.source, self.settings, **self.reading)
 
     def _missions(self, points: Sequence[Mapping[str, Any]]) -> Iterator[Mission]:
         """The mission of each point; `_files` gets the files that they are read from."""
@@ -161,15 +164,26 @@ class Batch:
         if not isinstance(self.source, (str, Path)):
             yield from map(self._ended, build_points(self.source, self.settings, settings))
             return
-        for loaded in read_points(self.source, self.settings, settings, **self._options):
+        for loaded in read_points(self.source, self.settings, settings, **self.reading):
             self._files |= {file: file.read_bytes() for file in loaded.files if file not in self._files}
             yield self._ended(loaded.mission)
+
+    def missions_at(self, points: Sequence[Mapping[str, Any]]) -> list[Mission]:
+        """The mission with further values, as settings, whose effect is not checked.
+
+        Raises:
+            TussleError: The mission cannot be played with them.
+        """
+        if not isinstance(self.source, (str, Path)):
+            return list(map(self._ended, build_points(self.source, self.settings, points)))
+        found = read_points(self.source, self.settings, points, **self.reading)
+        return [self._ended(loaded.mission) for loaded in found]
 
     def _settings(self, point: Mapping[str, Any]) -> dict[str, Any]:
         return settings_of(point, self.variables, is_argument=callable(self.source))
 
     def _ended(self, mission: Mission) -> Mission:
-        compat = self._options.get("compat")  # a mission made in Python does not have it yet
+        compat = self.reading.get("compat")  # a mission made in Python does not have it yet
         mission = mission if compat in (None, mission.compat) else mission.replace(compat=compat)
         return mission.ending_by_time() if self._ends_by_time else mission
 
@@ -342,7 +356,7 @@ class Batch:
                 "settings": self.loaded.settings,
                 "ends_by_time": self._ends_by_time,
                 "plugin_files": [f"{i}/{file.name}" for i, file in enumerate(self.plugin_files)],
-                "options": {k: v for k, v in self._options.items() if k != "plugin_files"},
+                "options": {k: v for k, v in self.reading.items() if k != "plugin_files"},
                 "notes": list(self.loaded.game_notes),
             },
             "variables": [variable_entry(v) for v in self.variables],

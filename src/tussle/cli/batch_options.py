@@ -180,7 +180,7 @@ class OptimizeOptions(ManyGamesOptions):
 
 
 @dataclass(frozen=True, kw_only=True)
-class StressOptions(PoolOptions):
+class StressOptions(ManyGamesOptions):
     """Find how a mission fails: how often its games break a specification, how near the others come, and how rare failures are."""
 
     spec: Annotated[
@@ -191,6 +191,19 @@ class StressOptions(PoolOptions):
         ),
     ] = ""
     games: Annotated[int, option("N", "Games to play.", "--games", "-n", min=1, shows_default=True)] = 1000
+    against: Annotated[
+        str | None,
+        option(
+            "OTHER",
+            "Search for games that fail while the same game of another mission does not: a mission file, or NAME=VALUE[,NAME=VALUE].",
+        ),
+    ] = None
+    sampler: Annotated[
+        str, option("NAME", "With --vary: what proposes the values: cmaes, tpe, random.", shows_default=True)
+    ] = "cmaes"
+    sample_seed: Annotated[
+        int, option("N", "With --vary: seed of what proposes the values.", min=0, shows_default=True)
+    ] = 0
     probability: Annotated[
         bool, flag("--probability", "Estimate how likely a failure is, however rare, by games that branch.")
     ] = False
@@ -238,10 +251,19 @@ class StressOptions(PoolOptions):
             )
         if self.junit is not None and self.holds is None:
             raise typer.BadParameter("--junit needs --holds: the probability above which the test passes")
+        if self.is_search and (self.probability or self.holds is not None):
+            raise typer.BadParameter(
+                "--probability and --holds are for one mission with one set of values; not with --vary and --against"
+            )
         if not self.spec:
             raise typer.BadParameter(
                 "--spec is missing: what must hold, such as 'always (distance(team 1, team 1) > 2 m)'"
             )
+
+    @property
+    def is_search(self) -> bool:
+        """Values are searched, or two missions compared."""
+        return bool(self.vary) or self.against is not None
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -15,7 +15,7 @@ from tussle.batch.store import reported
 from tussle.cli.batch import command_line
 from tussle.cli.batch_options import StressOptions
 from tussle.cli.interrupt import Interrupt, Interrupted
-from tussle.cli.options import show_notes
+from tussle.cli.options import read_settings, show_notes
 from tussle.cli.progress import ProgressMeter, compiling
 from tussle.cli.tables import fact_list, number_tables, title
 from tussle.cli.terminal import DOES_NOT_HOLD, OK, put, say, say_note
@@ -24,6 +24,7 @@ from tussle.record.run_file import put_whole
 from tussle.stress.chances import Chance
 from tussle.stress.confidence import Assurance, junit_xml
 from tussle.stress.games import Played
+from tussle.stress.search import FailureSearch, label
 from tussle.stress.shrink import SmallestGame
 from tussle.stress.study import FAILURES, MAX_FAILURES, Probability, Sample, Stress
 
@@ -50,6 +51,8 @@ def stress(options: StressOptions) -> int:
         allow_large=options.allow_large,
         compat=options.compat,
         search=list(map(str, options.data_path)),
+        vary=options.vary,
+        against=other_of(options.against),
     )
     show_notes(study.batch.loaded)
     directory = options.directory or study.default_directory()
@@ -68,11 +71,21 @@ def stress(options: StressOptions) -> int:
 
         how: dict[str, Any] = {"processes": options.processes, "stack": options.stack, "on_game": on_game}
         try:
-            if options.probability:
+            if options.is_search:
+                searched = study.search(
+                    options.games,
+                    options.sampler,
+                    sample_seed=options.sample_seed,
+                    directory=directory,
+                    **how,
+                )
+                failures = [game.played for game in searched.failures]
+            elif options.probability:
                 found = study.probability(options.particles, options.repetitions, directory=directory, **how)
+                failures = found.failures
             else:
                 sample = study.sample(options.games, directory=directory, **how)
-            failures = found.failures if options.probability else sample.failures
+                failures = sample.failures
             lost = study.chances(failures[0], directory=directory, **how) if options.why and failures else []
         except Interrupted:
             say(
@@ -81,7 +94,9 @@ def stress(options: StressOptions) -> int:
                 "bold yellow",
             )
             return interrupt.code
-    if options.probability:
+    if options.is_search:
+        show_search(searched, study, directory, options)
+    elif options.probability:
         show_probability(found, study, directory, options)
     else:
         show_sample(sample, study, directory, options)
@@ -92,6 +107,13 @@ def stress(options: StressOptions) -> int:
     if options.holds is None:
         return OK
     return judge(found if options.probability else sample, study, directory, options)
+
+
+def other_of(against: str | None) -> str | dict[str, str] | None:
+    """What `--against` names: a mission, or values."""
+    if against is None or "=" not in against or Path(against).exists():
+        return against
+    return read_settings(against.split(","))
 
 
 def judge(found: Sample | Probability, study: Stress, directory: Path, options: StressOptions) -> int:
@@ -129,6 +151,30 @@ def show_sample(sample: Sample, study: Stress, directory: Path, options: StressO
         ),
     )
     show_failures(sample.failures, study, directory, options)
+
+
+def show_search(found: FailureSearch, study: Stress, directory: Path, options: StressOptions) -> None:
+    """Show what a search found."""
+    n, nearest = len(found.games), found.nearest
+    other = "; the same game of the other mission does not" if study.others else ""
+    put(
+        "",
+        title(study.batch.name, str(study.specification)),
+        fact_list(
+            [
+                ("failed", f"{found.n_failed:,} of {n:,} games{other if found.n_failed else ''}"),
+                ("first failure", "" if found.first is None else f"game {found.first:,}"),
+                ("least robustness", f"{nearest.robustness:.6g}, with {found.label(nearest) or f'seed {nearest.played.game.seed}'}"),
+                ("study", str(directory)),
+            ]
+        ),
+    )  # fmt: skip
+    for number, game in enumerate(found.failures[:MAX_SHOWN] if study.variables else ()):
+        put(f" {FAILURES}/{number}.xml: {found.label(game)}")
+    show_failures([game.played for game in found.failures], study, directory, options)
+    if found.refused:
+        values, error = found.refused[0]
+        say_note(f"{len(found.refused):,} sets of values cannot be played, as {label(values)}: {error}")
 
 
 def show_probability(found: Probability, study: Stress, directory: Path, options: StressOptions) -> None:

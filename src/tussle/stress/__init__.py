@@ -5,6 +5,7 @@ from tussle.stress.confidence import Assurance
 from tussle.stress.games import Played, StressGame
 from tussle.stress.given import GivenGame, given_games
 from tussle.stress.monitor import Monitor, Verdict
+from tussle.stress.search import FailureSearch, Tried
 from tussle.stress.shrink import SmallestGame
 from tussle.stress.specification import Specification
 from tussle.stress.splitting import Repetition
@@ -13,6 +14,7 @@ from tussle.stress.study import Probability, Sample, Stress
 __all__ = [
     "Assurance",
     "Chance",
+    "FailureSearch",
     "GivenGame",
     "Monitor",
     "Played",
@@ -23,6 +25,7 @@ __all__ = [
     "Specification",
     "Stress",
     "StressGame",
+    "Tried",
     "Verdict",
     "given_games",
 ]

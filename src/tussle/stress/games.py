@@ -13,12 +13,14 @@ from typing import Any, Self
 
 from tussle.batch import by_value
 from tussle.batch.batch import Batch
+from tussle.batch.design_points import group_points
 from tussle.batch.executors import Executor, InProcess, Processes
 from tussle.batch.schemas import SEED
 from tussle.batch.store import locked, reported
 from tussle.batch.tasks import BatchRun, Finished
 from tussle.documents import Document, json_text, read_text
 from tussle.errors import BatchError
+from tussle.mission import Mission
 from tussle.mission.rekeys import Rekeys, rekeys_text
 from tussle.record.run_file import plain, put_whole
 from tussle.stress.monitor import Verdict, Watching
@@ -44,17 +46,20 @@ class StressGame:
     Attributes:
         seed: Its seed.
         rekeys: Steps from which it has other luck.
-        point: Number of its set of values.
+        values: Values that are set beside those of all games, (name, value).
+        mission: 0 for the mission of the study, 1 for the one that it is compared with.
     """
 
     seed: int
     rekeys: Rekeys = ()
-    point: int = 0
+    values: tuple[tuple[str, Any], ...] = ()
+    mission: int = 0
 
     @property
     def name(self) -> str:
         """A text that no other game of the study has."""
-        return f"{self.point}/{self.seed}/{rekeys_text(self.rekeys)}"
+        values = f"/{json.dumps(self.values)}" if self.values else ""
+        return f"{self.mission}/{self.seed}/{rekeys_text(self.rekeys)}{values}"
 
     def branch(self, step: int, key: int) -> StressGame:
         """The same game up to the state at the start of a step, and from there on with other luck."""
@@ -192,13 +197,14 @@ class GamePlayer:
     """Plays games and watches a specification; games that are in the ledger are not played again.
 
     Args:
-        batch: The batch that has the missions; a game's point is one of its points.
+        batch: The batch whose mission is played by games without values.
         watching: Makes the monitors.
         ledger: Keeps the games; None for memory only.
         executor: Plays; None chooses for each round.
         processes: How many; None is one per core, or none for short rounds.
         stack: Worlds side by side in each.
         on_game: Called after each game that is played.
+        missions: Makes the missions of games with values, and of those of another mission.
 
     Attributes:
         n_played: Games that were played, not taken from the ledger.
@@ -215,8 +221,9 @@ class GamePlayer:
         processes: int | None = None,
         stack: int | None = None,
         on_game: Callable[[Played], None] = lambda _: None,
+        missions: Callable[[Sequence[StressGame]], Sequence[Mission]] | None = None,
     ) -> None:
-        self.batch, self.ledger, self.executor = batch, ledger, executor
+        self.batch, self.ledger, self.executor, self.missions = batch, ledger, executor, missions
         self.processes, self.stack, self.on_game = processes, stack, on_game
         self.package = replace(batch.package, watch=by_value.dumps(watching))
         self.n_played, self.game_s, self.cpu_s = 0, 0.0, 0.0
@@ -240,19 +247,23 @@ class GamePlayer:
         return [found[game] for game in games]
 
     def _play(self, games: Sequence[StressGame], found: dict[StressGame, Played]) -> None:
-        points = self.batch.design_points
+        points, package = self.batch.design_points * len(games), self.package
+        if self.missions is not None and any(game.values or game.mission for game in games):
+            points, grouped = group_points(self.missions(games))
+            package = replace(package, missions=grouped.missions)
         runs = [
-            BatchRun(i, points[game.point].group, game.seed, points[game.point].params, game.rekeys)
-            for i, game in enumerate(games)
+            BatchRun(i, point.group, game.seed, point.params, game.rekeys)
+            for i, (game, point) in enumerate(zip(games, points, strict=True))
         ]
         spent = 0.0
-        with closing(self._executor(len(games)).play(self.package, runs)) as messages:
+        with closing(self._executor(len(games)).play(package, runs)) as messages:
             for message in messages:
                 if not isinstance(message, Finished):
                     continue
                 game = games[message.number]
                 if message.error:
-                    raise BatchError(f"the game with seed {game.seed} failed: {message.error}")
+                    values = "".join(f", {name}={value}" for name, value in game.values)
+                    raise BatchError(f"the game with seed {game.seed}{values} failed: {message.error}")
                 played = Played(game, message.watched, message.t, message.cpu_s, message.state_hash)
                 found[game] = played
                 spent += message.cpu_s

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Mapping, Sequence
+import math
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -15,17 +17,23 @@ import numpy as np
 
 from tussle.batch import by_value
 from tussle.batch.batch import Batch
+from tussle.batch.design_points import check_variables, with_whole_numbers
+from tussle.batch.points import settings_of
 from tussle.batch.statistics import wilson
 from tussle.batch.store import reported
+from tussle.batch.variables import Variable
+from tussle.batch.varied import as_variables, variable_entry
 from tussle.documents import Whole, check_argument, json_text
 from tussle.engine.simulation import Simulation
-from tussle.errors import ParameterError
+from tussle.errors import BatchError, ParameterError, TussleError
 from tussle.mission import Mission, to_xml
+from tussle.mission.effects import exactly
 from tussle.numeric import total
 from tussle.record.run_file import plain, put_whole, versions
 from tussle.stress.chances import Chance, chances
 from tussle.stress.games import GamePlayer, Ledger, Played, StressGame
 from tussle.stress.monitor import Watching
+from tussle.stress.search import FailureSearch, search, searcher
 from tussle.stress.shrink import MAX_SHRINK_GAMES, SmallestGame, shrink
 from tussle.stress.specification import Function, Specification, columns_of
 from tussle.stress.splitting import Repetition, interval, split
@@ -36,6 +44,8 @@ MAX_FAILURES = 10
 MANY = 0.5
 """Part of the games that a round of splitting may replace before a note says so."""
 MIN_ANCESTORS = 5
+MAX_MADE = 4096
+"""Missions of games with values that are kept."""
 
 
 @dataclass
@@ -120,6 +130,9 @@ class Stress:
         plugin_files: Python files whose plugins the mission file may name.
         ends_by_time: The game ends at its end time whatever the mission says.
         run_timeout: Wall time that a game may take [s], as for `Batch`.
+        vary: What `search` varies, as for `Batch`.
+        against: Another mission, or values by name: a game fails only if the same game of that mission, with the same seed, does not.
+            For `search` only.
         options: Further options of `read_mission`.
 
     Raises:
@@ -138,14 +151,34 @@ class Stress:
         plugin_files: Sequence[str | Path] = (),
         ends_by_time: bool = False,
         run_timeout: float | None = None,
+        vary: Mapping[str, Any] | Iterable[str | Variable] = (),
+        against: str | Path | Mission | Mapping[str, Any] | None = None,
         **options: Any,
     ) -> None:
         check_argument("first_seed", first_seed, Whole(0, 2**64 - 1))
         self.first_seed = first_seed
-        self.batch = Batch(
-            mission, runs=1, first_seed=first_seed, settings=settings, plugin_files=plugin_files,
-            ends_by_time=ends_by_time, run_timeout=run_timeout, **options,
+        given = dict(settings or {})
+        sources = [(mission, given)]
+        if isinstance(against, Mapping):
+            sources.append((mission, {**given, **against}))
+        elif against is not None:
+            sources.append((against, given))
+        self.batch, *others = (
+            Batch(
+                source, runs=1, first_seed=first_seed, settings=values, plugin_files=plugin_files,
+                ends_by_time=ends_by_time, run_timeout=run_timeout, **options,
+            )
+            for source, values in sources
         )  # fmt: skip
+        self.others = tuple(others)
+        self.variables = tuple(as_variables(vary))
+        for variable in self.variables:
+            if variable.name in given:
+                raise ParameterError(f"{variable.name} is set and varies; say one of the two")
+        if isinstance(mission, (str, Path)):
+            reading = {**options, "plugin_files": tuple(plugin_files)}
+            self.variables = tuple(with_whole_numbers(mission, given, self.variables, **reading))
+        self._made: dict[StressGame, Mission] = {}
         self.watching = Watching(specification, dict(functions or {}))
         self.specification: Specification = self.watching.specification(self.mission)
 
@@ -169,6 +202,10 @@ class Stress:
             "specification": str(self.specification),
             "first_seed": self.first_seed,
         }
+        if self.variables:
+            contents["variables"] = list(map(variable_entry, self.variables))
+        if self.others:
+            contents["against"] = [self.others[0].info()["mission"], self.others[0].fingerprint]
         text = json.dumps([contents, self.batch.fingerprint, code], default=str)
         return {
             "format": 1,
@@ -207,9 +244,10 @@ class Stress:
             BatchError: A game has failed with an error, or the directory holds another study.
         """
         check_argument("games", games, Whole(1, 10**9))
+        self._check_plain("sample")
         self.check()
         with self._ledger(directory) as ledger:
-            player = GamePlayer(self.batch, self.watching, ledger, **how)
+            player = self._player(ledger, how)
             played = player.play([StressGame((self.first_seed + i) % 2**64) for i in range(games)])
             n_failed = len([p for p in played if p.verdict.has_failed])
             found = Sample(played, *wilson(n_failed, games))
@@ -219,6 +257,93 @@ class Stress:
                 {"games": games, "failed": n_failed, "low": found.low, "high": found.high},
             )
         return found
+
+    def search(
+        self,
+        games: int = 1000,
+        sampler: str = "cmaes",
+        per_round: int = 32,
+        sample_seed: int = 0,
+        failures: int | None = None,
+        directory: str | Path | None = None,
+        **how: Any,
+    ) -> FailureSearch:
+        """Search for values and seeds with which games fail; with `against`, while the same game of the other mission does not.
+
+        Args:
+            games: How many are played, of each mission.
+            sampler: Proposes the values: cmaes, tpe (Optuna), or random.
+            per_round: Games that are proposed and played together.
+            sample_seed: Seed of what is proposed.
+            failures: End after the round in which so many games have failed; None for never.
+            directory: Where games are kept, and from where the same study goes on; None keeps them in memory.
+            how: `executor`, `processes`, `stack` and `on_game`, as for `GamePlayer`.
+
+        Raises:
+            BatchError: A game has failed with an error, the directory holds another study, or the mission file has changed meanwhile.
+            MissingExtraError: Optuna or cmaes is not installed.
+            ParameterError: Nothing varies, no values can be played, or an argument is not allowed.
+        """
+        check_argument("games", games, Whole(1, 10**6))
+        check_argument("per_round", per_round, Whole(4, 10**4))
+        check_argument("sample_seed", sample_seed, Whole(0, 2**32 - 1))
+        if not self.variables and not self.others:
+            raise ParameterError(
+                "nothing varies, so there is nothing to search; vary a value, or use `probability`"
+            )
+        by = searcher(sampler, self.variables, sample_seed, per_round)
+        self.check()
+        self._check_effects()
+        with self._ledger(directory) as ledger:
+            player = self._player(ledger, how)
+
+            def play(games: Sequence[StressGame]) -> list[Played]:
+                if any(
+                    exactly(b.missions_at([{}])[0]) != exactly(b.mission) for b in (self.batch, *self.others)
+                ):
+                    raise BatchError(
+                        f"{self.batch.name}: the mission has changed during the search; games before are kept"
+                    )
+                return player.play(games)
+
+            found = search(
+                play, self._refusal, self.variables, by, games, math.inf if failures is None else failures,
+                self.first_seed, self.mission.steps, bool(self.others),
+            )  # fmt: skip
+            tried = {"games": len(found.games), "failed": found.n_failed, "refused": len(found.refused)}
+            self._write(ledger, [game.played for game in found.failures], tried)
+        return found
+
+    def _refusal(self, values: Mapping[str, Any]) -> str:
+        """Why the missions cannot be played with some settings; "" if they can."""
+        try:
+            for mission in range(1 + len(self.others)):
+                self.mission_of(StressGame(0, (), tuple(values.items()), mission))
+        except TussleError as error:
+            return re.sub(r"^point 0 \(.*?\): ", "", str(error))
+        return ""
+
+    def _check_effects(self) -> None:
+        """Read the mission file with low, middle and high values, and check that each makes a difference.
+
+        Raises:
+            MissionError: A value has no effect.
+        """
+        if not isinstance(self.batch.source, (str, Path)) or not self.variables:
+            return
+        points = [
+            settings_of({v.name: v.value_at(share) for v in self.variables}, self.variables)
+            for share in (0.5, 0.0, 1.0)
+        ]
+        playable = [point for point in points if not self._refusal(point)]
+        if playable:
+            check_variables(self.batch.source, self.batch.settings, playable, **self.batch.reading)
+
+    def _check_plain(self, name: str) -> None:
+        if self.variables or self.others:
+            raise ParameterError(
+                f"{name} plays one mission with one set of values; to vary or compare, use `search`"
+            )
 
     def probability(
         self,
@@ -241,13 +366,14 @@ class Stress:
             BatchError: A game has failed with an error, or the directory holds another study.
             ParameterError: The mission has no randomness, or a number is not allowed.
         """
+        self._check_plain("probability")
         check_argument("particles", particles, Whole(2, 10**6))
         check_argument("repetitions", repetitions, Whole(2, 10**4))
         if not 0.0 < replaced < 1.0:
             raise ParameterError(f"replaced = {replaced!r} is not allowed; it takes a number between 0 and 1")
         self.check()
         with self._ledger(directory) as ledger:
-            player = GamePlayer(self.batch, self.watching, ledger, **how)
+            player = self._player(ledger, how)
             n_replaced = max(1, round(replaced * particles))
             found = split(_Random(player.play), particles, n_replaced, repetitions, self.first_seed)
             value, low, high = interval([r.probability for r in found])
@@ -290,7 +416,7 @@ class Stress:
         check_argument("moments", moments, Whole(2, 10**4))
         check_argument("branches", branches, Whole(1, 10**6))
         with self._ledger(directory) as ledger:
-            player = GamePlayer(self.batch, self.watching, ledger, **how)
+            player = self._player(ledger, how)
             return chances(player.play, failed, moments, branches)
 
     def smallest(self, failed: Played, max_games: int = MAX_SHRINK_GAMES) -> SmallestGame:
@@ -304,7 +430,7 @@ class Stress:
             ParameterError: The game did not fail, or the number is not allowed.
         """
         check_argument("max_games", max_games, Whole(1, 10**6))
-        return shrink(self.batch.missions[failed.game.point], failed, self.watching, max_games)
+        return shrink(self.mission_of(failed.game), failed, self.watching, max_games)
 
     def _notes(self, found: Probability) -> list[str]:
         repetitions, n = found.repetitions, len(found.repetitions)
@@ -340,9 +466,30 @@ class Stress:
     def _ledger(self, directory: str | Path | None) -> Any:
         return nullcontext() if directory is None else Ledger(Path(directory), self.info)
 
+    def _player(self, ledger: Ledger | None, how: Mapping[str, Any]) -> GamePlayer:
+        return GamePlayer(
+            self.batch, self.watching, ledger, missions=lambda games: list(map(self.mission_of, games)), **how
+        )
+
+    def mission_of(self, game: StressGame) -> Mission:
+        """The mission of a game, with its values.
+
+        Raises:
+            TussleError: It cannot be played with them.
+        """
+        batch = (self.batch, *self.others)[game.mission]
+        if not game.values:
+            return batch.mission
+        key = StressGame(0, (), game.values, game.mission)
+        if key not in self._made:
+            if len(self._made) >= MAX_MADE:
+                self._made.clear()
+            (self._made[key],) = batch.missions_at([dict(game.values)])
+        return self._made[key]
+
     def failing_mission(self, game: StressGame) -> str:
         """A mission file that plays a game again, with its seed and its luck."""
-        return to_xml(self.batch.missions[game.point].replace(rekeys=game.rekeys), game.seed)
+        return to_xml(self.mission_of(game).replace(rekeys=game.rekeys), game.seed)
 
     def _write(self, ledger: Ledger | None, failures: Sequence[Played], result: Mapping[str, Any]) -> None:
         """Write the result, and the worst failures as missions."""
@@ -357,6 +504,7 @@ class Stress:
                     {
                         "file": f"{FAILURES}/{number}.xml",
                         "robustness": each.verdict.robustness,
+                        "values": dict(each.game.values),
                         "state_hash": each.state_hash,
                     }
                 )
@@ -381,9 +529,9 @@ class _Random:
 
 def worst_first(games: Any) -> list[Played]:
     """Different games, the worst first: of those that branched from one game only the worst."""
-    best: dict[tuple[int, int], Played] = {}
+    best: dict[tuple[Any, int], Played] = {}
     for played in games:
-        key = played.game.point, played.game.seed
+        key = played.game.values, played.game.seed
         if key not in best or played.verdict.robustness < best[key].verdict.robustness:
             best[key] = played
     return sorted(best.values(), key=lambda p: p.verdict.robustness)

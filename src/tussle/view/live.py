@@ -229,16 +229,27 @@ class Live:
         for who in entities:
             self.publish(RemoveEntity, entity=int(who), why="order")
 
+    def spawn(self, block: str, position: Any) -> None:
+        """Ask for an entity of a block before the next step, which is born with the one after it. Errors of the game appear in `notes`.
+
+        Args:
+            block: Name of the block. The entity has its heading and speed.
+            position: Position [m], (3,), world frame.
+
+        Raises:
+            ParameterError: The position is not three finite numbers.
+        """
+        self._check_is_own()
+        pos = _checked_point("position", position)
+        self._give(lambda: self._playback.spawn(block, pos))
+
     def publish_click(self, point: Any) -> None:
         """Publish `WorldPointClicked` with a point [m], (3,), on the network that reaches everyone.
 
         Raises:
             ParameterError: It is not three finite numbers.
         """
-        pos = np.array(point, float)
-        if pos.shape != (3,) or not np.isfinite(pos).all():
-            raise ParameterError(f"point = {point!r} is not allowed; it takes x, y, z in m")
-        self.publish(WorldPointClicked, pos=pos)
+        self.publish(WorldPointClicked, pos=_checked_point("point", point))
 
     def publish_key(self, key: str) -> None:
         """Publish `CustomKeyPress` on the network that reaches everyone."""
@@ -501,3 +512,10 @@ class Live:
     def scenery(self) -> Scenery:
         """Ground, bases, boundaries and terrain."""
         return scenery_of(self.simulation.mission, self.viewer)
+
+
+def _checked_point(name: str, point: Any) -> np.ndarray:
+    pos = np.array(point, float)
+    if pos.shape != (3,) or not np.isfinite(pos).all():
+        raise ParameterError(f"{name} = {point!r} is not allowed; it takes x, y, z in m")
+    return pos

@@ -11,9 +11,12 @@ import numpy as np
 
 from tussle.declare.columns import Column, EntityRef, Handle, Numbers, Param, Subscribe
 from tussle.declare.messages import Message
+from tussle.engine.births import VALUES
 from tussle.engine.group import Binding, Group
 from tussle.engine.simulation import Simulation
 from tussle.errors import ParameterError, listed, nearest_name
+from tussle.numeric import cos, sin
+from tussle.numeric.quaternion import quat_from_euler
 from tussle.record.inputs import COLUMN, ExternalInput
 
 MAX_ITEMS = 1000
@@ -137,6 +140,46 @@ def setting_inputs(
         step = int(state.context.clock.step[world])
         found.append(ExternalInput(step, COLUMN, f"{names[block]}.{path}", values.tolist()))
     return found
+
+
+def birth_fields(
+    simulation: Simulation, world: int, block: str, pos: np.ndarray, n_asked: int
+) -> dict[str, Any]:
+    """The fields of the `SpawnEntity` that asks for an entity of a block, with heading and speed of the block without their variance.
+
+    Args:
+        simulation: The simulation.
+        world: Number of the world.
+        block: Name of the block.
+        pos: Position [m], (3,).
+        n_asked: Number of entities that were asked for before this step.
+
+    Raises:
+        ParameterError: There is no such block, or the world has no space.
+    """
+    state = simulation.state
+    names, births = list(state.world_view.templates), state.births
+    if block not in names:
+        raise ParameterError(
+            f"spawn: there is no block {block!r}{nearest_name(block, names)}; {listed(names)}"
+        )
+    n_alive = np.bincount(state.population.bodies.world, minlength=state.n_worlds)
+    n_requested = sum(int((asked["world"] == world).sum()) for asked in state.world_view.births)
+    if births.space(n_alive)[world] <= n_requested + n_asked:
+        raise ParameterError(
+            f"spawn: world {world} has its most entities; allow_large of the mission raises the limit"
+        )
+    spec = births.overrides.mission.blocks[names.index(block)]
+    values = births.overrides.block_values(spec, VALUES, np.array([world]))
+    heading, climb, roll, speed = values[:4, 0]
+    ahead = np.array([cos(climb) * cos(heading), cos(climb) * sin(heading), sin(climb)])
+    vel = speed * ahead if spec.velocity is None else np.array(spec.velocity)
+    return {
+        "block": [block],
+        "pos": pos,
+        "vel": vel,
+        "quat": np.array(quat_from_euler(roll, -climb, heading)),
+    }
 
 
 def field_of(name: str, column: Column) -> OrderField | None:

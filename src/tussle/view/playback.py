@@ -10,6 +10,8 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from tussle.declare.messages import Message
 from tussle.errors import PluginError, TussleError
 from tussle.pacing import Pace
@@ -266,3 +268,7 @@ class PlaybackController:
     def set_parameter(self, path: str, value: Any, to: tuple[int, ...]) -> None:
         """Set a parameter of some entities."""
         self.player.set_parameter(path, value, to)
+
+    def spawn(self, block: str, pos: np.ndarray) -> None:
+        """Ask for an entity of a block."""
+        self.player.spawn(block, pos)

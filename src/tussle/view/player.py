@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tussle.declare.displays import counted
-from tussle.declare.messages import Message, Messages
+from tussle.declare.messages import Message, Messages, SpawnEntity
 from tussle.engine.delivery import check_order
 from tussle.engine.simulation import Simulation
 from tussle.record import Events
 from tussle.view.curves import GameCurves
 from tussle.view.frame import Event, frame_of
-from tussle.view.orders import setting_inputs
+from tussle.view.orders import birth_fields, setting_inputs
 from tussle.view.timeline import History, Timeline
 
 if TYPE_CHECKING:
@@ -255,6 +255,16 @@ class Player:
         setting_inputs(self.simulation, self.world, path, value, to)
         self._take_course()
         self.injections.append(Setting(self.step, path, value, to))
+
+    def spawn(self, block: str, pos: np.ndarray) -> None:
+        """Ask for an entity of a block at a position [m], (3,).
+
+        Raises:
+            ParameterError: There is no such block, or the world has no space.
+        """
+        asked = [g for g in self.injections if isinstance(g, Injection) and g.type is SpawnEntity]
+        n_asked = sum(given.step == self.step for given in asked)
+        self.publish(SpawnEntity, "", "", birth_fields(self.simulation, self.world, block, pos, n_asked))
 
     def _take_course(self) -> None:
         """Drop what lies in the future: something comes from outside before the next step."""

@@ -85,3 +85,30 @@ def test_what_is_refused_is_said_in_one_sentence(tussle, changes, message, code)
     done = tussle(*STUDY, *changes, code=code)
     assert message in " ".join(done.stderr.split())
     assert "Traceback" not in done.stderr
+
+
+def test_a_search_for_values_that_fail(tussle, folder):
+    search = (*STUDY, "-n", "160", "--vary", "left.Hover.gust=1:9", "--vary", "left.Hover.gain=-0.1:1")
+    done = tussle(*search, "--why")
+    text = " ".join(done.stdout.split())
+    assert re.search(r"failed [1-9]\d* of 160 games first failure game \d+ least robustness -\d", text)
+    assert "branches that fail" in text
+    assert re.search(r"failures/0.xml: left.Hover.gust=\S+, left.Hover.gain=0\.\d+", text)
+    assert re.search(
+        r"sets of values cannot be played, as left.Hover.gust=\S+ left.Hover.gain=-",
+        " ".join(done.stderr.split()),
+    )
+    played = tussle("run", folder / "out/failures/0.xml", "--plugin-path", EXAMPLE / "hover.py")
+    assert json.loads((folder / "out/result.json").read_text())["failures"][0]["state_hash"] in played.stdout
+    compared = tussle(
+        *STUDY,
+        "-n",
+        "60",
+        "--spec",
+        "always (distance(left, right) > 6 m)",
+        "--against",
+        "left.Hover.gust=0,right.Hover.gust=0",
+        "--out",
+        "other",
+    )
+    assert "the same game of the other mission does not" in " ".join(compared.stdout.split())

@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 from six_degrees import Pilot, seen
 
-from tussle import Block, Mission, Simulation
-from tussle.api import Autonomy, EntityRef, Publish, Subscribe
+from tussle import Block, Mission, Simulation, stock
+from tussle.api import Autonomy, EntityRef, Output, Publish, Subscribe
+from tussle.api.channel_map import channel_rows
+from tussle.api.channels import CHANNEL_UNITS
 from tussle.errors import ParameterError, WiringError
 from tussle.messages import ChargeAdded, ChargePercentage
 from tussle.stock import MotionBattery, Unicycle, UnicyclePID
@@ -79,3 +81,31 @@ def test_channels_that_are_not_in_the_map_are_not_passed():
 def test_what_is_no_map_is_refused(text, message):
     with pytest.raises(ParameterError, match=r"MotionBattery.depletion_map: .*" + message):
         MotionBattery(depletion_map=text)
+
+
+@pytest.mark.parametrize("name", ["SimpleCar", "SimpleQuadrotor", "DubinsAirplane", "Multirotor"])
+def test_it_passes_the_channels_of_any_vehicle(name):
+    """Each is discharged by a command of its own, and limits it."""
+    vehicle = getattr(stock, name)()
+    channels = [c for k in vehicle.active_inputs() for c in type(vehicle).inputs()[k].channels]
+    body = {c: Output(unit=CHANNEL_UNITS[c]) for c in channels}
+    driver = type(
+        "Steers" + name,
+        (Autonomy,),
+        {**body, "step": lambda self, g: [getattr(self, c).fill(0.1) for c in channels]},
+    )
+    rows = " ".join(f"[ {c}, 0.5, NonZero, true, 0.0 ]" for c in channels)
+    entity = Block(
+        name="a", position=(0, 0, 50), autonomy=driver(), controller=MotionBattery(depletion_map=rows), motion=vehicle
+    )  # fmt: skip
+    sim = Simulation(Mission(blocks=[entity], dt=0.1, end=2.0))
+    sim.step()
+    assert seen(sim, "MotionBattery.charge") == pytest.approx(max(1.0 - 0.05 * len(channels), 0.0))
+    sim.step(25)
+    assert seen(sim, "MotionBattery.charge") == 0.0
+
+
+def test_inputs_of_a_joystick_or_autopilot_drive_any_channel():
+    assert channel_rows("[steering 0 -1 1 -0.5 0.5 1]")[0].value(1.0) == 0.5
+    with pytest.raises(ParameterError, match="did you mean 'steering'"):
+        channel_rows("[steerin 0 -1 1 -0.5 0.5 1]")

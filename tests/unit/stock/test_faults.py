@@ -10,7 +10,7 @@ from test_radio_network import hears, is_near, n_heard, talks
 
 from tussle import Block, Mission, Simulation
 from tussle.api import Autonomy, Input, MotionModel, Output, Sensor
-from tussle.api.channels import COMMAND_CHANNELS, MEASURED_CHANNELS
+from tussle.api.channels import CHANNEL_UNITS, MEASURED_CHANNELS
 from tussle.errors import ParameterError, WiringError
 from tussle.plugins import stock
 from tussle.stock import (
@@ -41,7 +41,7 @@ def driver(channels, value):
         for name in channels:
             getattr(self, name)[:] = value + g.step_count
 
-    body = {name: Output(unit=COMMAND_CHANNELS[name]) for name in channels}
+    body = {name: Output(unit=CHANNEL_UNITS[name]) for name in channels}
     return type("Driver", (Autonomy,), {**body, "step": step, "__doc__": "Writes numbers."})()
 
 
@@ -61,7 +61,7 @@ def test_the_tables_have_all_channels():
     for cls in CLASSES.values():
         if issubclass(cls, (MotionModel, Sensor)) and "Fault" not in cls.__name__:
             columns = cls.inputs() if issubclass(cls, MotionModel) else cls.outputs()
-            known = COMMAND_CHANNELS if issubclass(cls, MotionModel) else MEASURED_CHANNELS
+            known = CHANNEL_UNITS if issubclass(cls, MotionModel) else MEASURED_CHANNELS
             for column in columns.values():
                 for name, unit in zip(column.channels, column.units, strict=False):
                     assert column.ragged or "ROS" in cls.__name__ or known[name] == unit

@@ -22,7 +22,7 @@ def sample(n_failed, n):
     """Games of which some failed."""
     games = [
         SimpleNamespace(
-            game=SimpleNamespace(point=0, seed=i),
+            game=SimpleNamespace(values=(), seed=i),
             verdict=SimpleNamespace(has_failed=i < n_failed, robustness=float(i)),
         )
         for i in range(n)

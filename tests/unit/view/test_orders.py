@@ -7,6 +7,7 @@ from tussle import Block, Mission, Recorder, Simulation
 from tussle.declare.columns import EntityRef, Field, Handle
 from tussle.errors import ParameterError
 from tussle.messages import Message, RoadGraph, TextMessage, WaypointList
+from tussle.mission import Limits
 from tussle.record import load_inputs
 from tussle.stock import GoTo, MotorSchemas, MoveToGoalMS, SingleIntegrator, Still, WaypointDispatcher
 from tussle.view import Live
@@ -181,3 +182,68 @@ def test_a_list_of_waypoints_is_followed_by_those_who_got_it():
             ParameterError, match=r"there is no topic GlobalNetwork/WaypointLists \(did you mean"
         ):
             live.order([2], "GlobalNetwork", "WaypointLists", {})
+
+
+def test_entities_are_added_where_an_operator_says_and_that_is_part_of_the_game(tmp_path):
+    blocks = [fleet().blocks[0], fleet().blocks[1].replace(heading=1.0, speed=7.0)]
+    mission = fleet().replace(blocks=blocks)
+    with (
+        Simulation(mission, [1, 2]) as simulation, Recorder(simulation, tmp_path / "run") as recorder,
+        Live(simulation, threaded=False, is_paused=True) as live,
+    ):  # fmt: skip
+        live.step(5)
+        live.spawn("b", (30, 40, 5))
+        live.spawn("a", [-30, 40, 5])
+        live.step(2)
+        assert not live.notes
+        frame = live.frame()
+        assert frame.id.tolist() == [1, 2, 3, 4, 5, 6, 7, 8]
+        assert sorted(frame.block[-2:].tolist()) == [0, 1]
+        assert (simulation.state.population.bodies.world == 1).sum() == 6
+        new = frame.block.tolist().index(1, 6)
+        assert np.allclose(frame.pos[new], (30, 40, 5), atol=6.0)
+        # They take orders as the others do.
+        live.set_parameter([int(frame.id[new])], "GoTo.speed", 30)
+        live.step(20)
+        there = simulation.state_hash()
+        live.seek(0.3)
+        live.step(24)
+        assert simulation.state_hash() == there
+        recorder.flush()
+        inputs = load_inputs(tmp_path / "run")
+    first = inputs[0]
+    assert (first.step, first.name, first.values["block"], first.values["pos"]) == (
+        5,
+        "SpawnEntity",
+        "b",
+        [30, 40, 5],
+    )
+    assert np.allclose(first.values["vel"], (7 * np.cos(1.0), 7 * np.sin(1.0), 0))
+    for seeds, world in (([1], 0), ([8, 1, 3], 1)):
+        with Simulation(mission, seeds) as again:
+            again.play_inputs(inputs, world)
+            again.step(27)
+            assert again.state_hash(world) == there
+
+
+def test_an_entity_that_cannot_be_added_is_told_and_changes_nothing():
+    mission = fleet(1).replace(limits=Limits(rows=4))
+    with Simulation(mission, 1) as simulation, Live(simulation, threaded=False, is_paused=True) as live:
+        live.step(2)
+        with pytest.raises(
+            ParameterError, match=r"position = \(1, 2\) is not allowed; it takes x, y, z in m"
+        ):
+            live.spawn("a", (1, 2))
+        live.spawn("aa", (1, 2, 3))
+        assert live.notes[0].startswith("spawn: there is no block 'aa' (did you mean 'a'?)")
+        live.spawn("a", (1, 2, 3))
+        live.spawn("b", (1, 2, 3))
+        live.spawn("a", (9, 2, 3))
+        assert len(live.injections) == 2
+        live.step(1)
+        live.spawn("a", (9, 2, 3))
+        live.step(3)
+        live.spawn("a", (9, 2, 3))
+        assert len(live.injections) == 2
+        assert len(live.frame().id) == 4
+        assert live.notes[-1].startswith("spawn: world 0 has its most entities")

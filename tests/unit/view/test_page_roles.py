@@ -17,6 +17,7 @@ EVERYTHING = [
     ("pause", {}), ("resume", {}), ("step", {"n": 3}), ("seek", {"t": 0.0}), ("warp", {"value": 4.0}), ("faster", {}), ("slower", {}),
     ("reset", {"seed": 9}), ("point", {"pos": [1.0, 2.0, 0.0]}), ("key", {"key": ";"}), ("order", {"receivers": [1], **ORDER}),
     ("set", {"entities": [1], "path": "GoTo.speed", "value": 3.0}), ("remove", {"entities": [1]}),
+    ("spawn", {"block": "blue", "pos": [1.0, 2.0, 0.0]}),
 ]  # fmt: skip
 
 

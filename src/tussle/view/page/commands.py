@@ -81,10 +81,10 @@ def game_commands(live: Live) -> dict[str, Command]:
     def warp(value: float | None) -> None:
         live.warp = value
 
-    def point(pos: list[float]) -> None:
+    def near(pos: list[float]) -> list[float]:
         if max(map(abs, pos)) > REACH * live.scenery.size:
             raise ParameterError("there is no ground there")
-        live.publish_click(pos)
+        return pos
 
     return {
         "pause": Command(live.pause),
@@ -95,7 +95,7 @@ def game_commands(live: Live) -> dict[str, Command]:
         "faster": Command(live.faster),
         "slower": Command(live.slower),
         "reset": Command(live.reset, {"seed": ID}),
-        "point": Command(point, {"pos": POINT}),
+        "point": Command(lambda pos: live.publish_click(near(pos)), {"pos": POINT}),
         "key": Command(live.publish_key, {"key": KEY}),
         "order": Command(
             live.order,
@@ -105,6 +105,7 @@ def game_commands(live: Live) -> dict[str, Command]:
         "set": Command(
             live.set_parameter, {"entities": IDS, "path": str, "value": TYPED.rule}, receivers="entities"
         ),
+        "spawn": Command(lambda block, pos: live.spawn(block, near(pos)), {"block": str, "pos": POINT}),
         "remove": Command(live.remove, {"entities": IDS}, receivers="entities"),
     }
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from tussle.api import Autonomy, GroupView, Handle, Output, Param, State
 from tussle.api.channel_map import channel_outputs, write_channels
-from tussle.api.channels import DRIVEN_CHANNELS
+from tussle.api.channels import CHANNEL_UNITS
 from tussle.plugins.links.autopilots.frames import vehicle_states
 from tussle.plugins.links.autopilots.link import MAX_PORT, AutopilotLink, OwnedPorts, StepClock, await_links
 
@@ -31,7 +31,7 @@ class Autopilot(Autonomy):
     world_step = Param(
         0, structural=True, ge=0, le=MAX_PORT, doc="Ports are higher by this for each world of a stack."
     )
-    for _channel, _unit in DRIVEN_CHANNELS.items():
+    for _channel, _unit in CHANNEL_UNITS.items():
         vars()[f"{_channel}_out"] = Output(_channel, unit=_unit, doc="Command.")
     unanswered = State(
         doc="Steps in lockstep that went on with the commands before, without an answer.", dtype=int

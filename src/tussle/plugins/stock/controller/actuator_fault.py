@@ -6,7 +6,7 @@ import numpy as np
 
 from tussle.api import Controller, GroupView, Input, Output
 from tussle.api.channel_fault import ChannelFault, ChannelsParam, channel_names
-from tussle.api.channels import COMMAND_CHANNELS
+from tussle.api.channels import CHANNEL_UNITS
 
 
 class ActuatorFault(ChannelFault, Controller):
@@ -29,10 +29,10 @@ class ActuatorFault(ChannelFault, Controller):
     grade = "portable"
 
     channels = ChannelsParam(
-        "velocity_x velocity_y velocity_z", COMMAND_CHANNELS, doc="Channels that are altered."
+        "velocity_x velocity_y velocity_z", CHANNEL_UNITS, doc="Channels that are altered."
     )
-    passed = ChannelsParam("", COMMAND_CHANNELS, at_least=0, doc="Channels that are passed unaltered.")
-    for _channel, _unit in COMMAND_CHANNELS.items():
+    passed = ChannelsParam("", CHANNEL_UNITS, at_least=0, doc="Channels that are passed unaltered.")
+    for _channel, _unit in CHANNEL_UNITS.items():
         vars()[f"{_channel}_in"] = Input(_channel, unit=_unit, doc="Command.")
         vars()[f"{_channel}_out"] = Output(_channel, unit=_unit, doc="Command passed on.")
 

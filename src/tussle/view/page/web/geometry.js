@@ -64,3 +64,21 @@ export function perspective(eye, right, up, away, fieldOfView, aspect, near, far
   const lens = [f / aspect, 0, 0, 0, 0, f, 0, 0, 0, 0, (near + far) / (near - far), -1, 0, 0, (2 * near * far) / (near - far), 0];
   return product(lens, look);
 }
+
+/**
+ * The corners of a line on the ground without those that are nearer than a tolerance [m] to the rest: Douglas and Peucker, Algorithms for
+ * the reduction of the number of points required to represent a digitized line, The Canadian Cartographer 10(2), 1973.
+ * @param {number[][]} line @param {number} tolerance @returns {number[][]}
+ */
+export const simplified = (line, tolerance) => {
+  const [[x, y], [endX, endY]] = [line[0], line[line.length - 1]];
+  const [alongX, alongY] = [endX - x, endY - y];
+  const square = alongX * alongX + alongY * alongY;
+  const distances = line.map(([px, py]) => {
+    const share = square ? Math.min(1, Math.max(0, ((px - x) * alongX + (py - y) * alongY) / square)) : 0;
+    return Math.hypot(px - x - share * alongX, py - y - share * alongY);
+  });
+  const furthest = distances.reduce((best, distance, i) => (distance > distances[best] ? i : best), 0);
+  if (distances[furthest] <= tolerance) return [line[0], line[line.length - 1]];
+  return [...simplified(line.slice(0, furthest + 1), tolerance).slice(0, -1), ...simplified(line.slice(furthest), tolerance)];
+};

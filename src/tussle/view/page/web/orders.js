@@ -3,11 +3,15 @@
 /** @import { Player } from './player.js' */
 
 import { byId, element, say } from './formatting.js';
+import { simplified } from './geometry.js';
 import { Live } from './live.js';
 
 /** Receivers of one command: of more, several are sent. */
 const MAX_RECEIVERS = 1000;
 const REMOVE = 'remove';
+const SPAWN = 'spawn';
+/** @type {OrderField} */
+const PLACE = { name: 'position', kind: 'number', parts: ['x', 'y', 'z'], units: ['m', 'm', 'm'], is_list: false, doc: 'Where it is born.', example: [] };
 
 export class OrderForm {
   /** @param {Player} player */
@@ -33,7 +37,7 @@ export class OrderForm {
     const isThere = Boolean(entity && entity.id === chosen && layer.slotOf(chosen) >= 0 && this.may(chosen));
     this.form.hidden = !isThere;
     if (!isThere) return;
-    const key = JSON.stringify(entity.orders);
+    const key = JSON.stringify([entity.orders, this.maySpawn, this.block]);
     if (key === this.offered) return;
     this.offered = key;
     this.kinds = entity.orders;
@@ -45,7 +49,7 @@ export class OrderForm {
       made.label = label;
       made.append(...some);
       return made;
-    }), new Option('Remove it', REMOVE));
+    }), new Option('Remove it', REMOVE), ...(this.maySpawn && this.block ? [new Option(`Add one to ${this.block}`, SPAWN)] : []));
     this.fill();
   }
 
@@ -62,11 +66,29 @@ export class OrderForm {
     return this.kinds[Number(this.select.value)];
   }
 
+  /** Name of the block of the chosen entity. */
+  get block() {
+    const { layer, chosen, page } = this.player;
+    return page.blocks[layer.shown.block[layer.slotOf(chosen)]]?.name;
+  }
+
+  /** Whether this address may add entities. */
+  get maySpawn() {
+    const { layer } = this.player;
+    return layer instanceof Live && layer.status.steers;
+  }
+
+  get isSpawn() {
+    return this.select.value === SPAWN;
+  }
+
   /** The fields of the order that is selected. */
   fill() {
-    const { kind } = this;
-    say(this.form.querySelector('p'), kind ? kind.doc : 'It dies at the end of the next step.');
-    this.form.querySelector('.fields').replaceChildren(...(kind ? kind.fields.map((field) => this.makeField(field)) : []));
+    const { kind, isSpawn } = this;
+    const fields = isSpawn ? [PLACE] : kind ? kind.fields : [];
+    this.receivers.hidden = isSpawn;
+    say(this.form.querySelector('p'), isSpawn ? `It is born in two steps, with heading and speed of ${this.block}.` : kind ? kind.doc : 'It dies at the end of the next step.');
+    this.form.querySelector('.fields').replaceChildren(...fields.map((field) => this.makeField(field)));
   }
 
   /** @param {OrderField} field */
@@ -100,6 +122,14 @@ export class OrderForm {
       button.type = 'button';
       button.addEventListener('click', () => this.player.pick(true, (pos) => this.takePlace(box, pos, field)));
       box.append(button);
+      if (isList) {
+        const stroke = element('button', '', 'Draw a line');
+        stroke.type = 'button';
+        stroke.addEventListener('click', () => this.player.pickStroke((line) => {
+          for (const pos of simplified(line, this.player.camera.distance / 100)) this.takePlace(box, pos, field);
+        }));
+        box.append(stroke);
+      }
     }
     return box;
   }
@@ -149,6 +179,13 @@ export class OrderForm {
     const { player, kind } = this;
     const ids = this.ids();
     try {
+      if (this.isSpawn) {
+        const pos = this.typed(PLACE);
+        if (!pos) throw new Error('position: x, y, z');
+        player.order(SPAWN, { block: this.block, pos });
+        player.say(`One more of ${this.block}: in two steps`);
+        return;
+      }
       const typed = kind ? kind.fields.map((field) => [field.name, this.typed(field)]).filter(([, value]) => value !== undefined) : [];
       const values = Object.fromEntries(typed);
       if (kind && !kind.network && values.value === undefined) throw new Error('value: a number');

@@ -51,6 +51,10 @@ export class Player {
     this.isLost = false;
     /** What takes a picked point. @type {((pos: number[]) => void) | null} */
     this.takePoint = null;
+    /** What takes a line that is drawn. @type {((line: number[][]) => void) | null} */
+    this.takeStroke = null;
+    /** Places of this line so far. @type {number[][]} */
+    this.stroke = [];
     this.lookedBack = 0;
     /** @type {number | undefined} */
     this.looking = undefined;
@@ -305,8 +309,35 @@ export class Player {
     if (!this.source.isLive) return;
     this.isPicking = isPicking;
     this.takePoint = take;
+    this.takeStroke = null;
+    this.stroke = [];
     this.canvas.classList.toggle('is-picking', isPicking);
     this.say(isPicking ? `Click on the ground${take ? '' : ': plugins are told of it in the next step'}` : 'No point is picked');
+  }
+
+  /** Wait for a line that is drawn on the ground in one stroke. @param {(line: number[][]) => void} take takes its places */
+  pickStroke(take) {
+    if (!this.source.isLive) return;
+    this.pick(true);
+    this.takeStroke = take;
+    this.say('Draw a line on the ground, with the button held');
+  }
+
+  get isStroke() {
+    return Boolean(this.takeStroke);
+  }
+
+  /** The stroke goes on to a pixel of the window. @param {number} x @param {number} y */
+  drawTo(x, y) {
+    const pos = this.picture.groundAt(x, y);
+    if (pos) this.stroke.push(pos);
+  }
+
+  endStroke() {
+    const { takeStroke: take, stroke } = this;
+    this.pick(false);
+    if (stroke.length > 1) take(stroke);
+    this.say(stroke.length > 1 ? 'The line is in the form' : 'No line is drawn');
   }
 
   /** Tell the plugins, or who waits for it, of the ground at a pixel of the window. @param {number} x @param {number} y */

@@ -32,6 +32,7 @@ export class Steering {
     this.down.set(event.pointerId, { x: event.clientX, y: event.clientY });
     this.isClick = this.down.size === 1 && event.button === 0;
     if (this.down.size > 1) return;
+    if (this.player.isStroke) this.player.drawTo(event.clientX, event.clientY);
     this.start = { x: event.clientX, y: event.clientY };
     this.isPan = event.button !== 0 || event.shiftKey || event.ctrlKey;
   }
@@ -42,6 +43,7 @@ export class Steering {
     const was = this.down.get(event.pointerId);
     if (!was) return player.hover(player.picture.whoIsAt(event.clientX, event.clientY));
     const now = { x: event.clientX, y: event.clientY };
+    if (player.isStroke && this.down.size === 1) return player.drawTo(now.x, now.y);
     if (this.isClick && Math.hypot(now.x - this.start.x, now.y - this.start.y) < STILL) return undefined;
     if (this.isClick || !this.isMoving) {
       player.viewpoint.remember();
@@ -75,7 +77,8 @@ export class Steering {
     this.down.delete(event.pointerId);
     if (this.down.size) return;
     this.canvas.classList.remove('is-dragged');
-    if (this.isClick && event.type === 'pointerup') this.player.click(event.clientX, event.clientY);
+    if (this.player.isStroke) this.player.endStroke();
+    else if (this.isClick && event.type === 'pointerup') this.player.click(event.clientX, event.clientY);
     this.isClick = false;
     this.isMoving = false;
   }

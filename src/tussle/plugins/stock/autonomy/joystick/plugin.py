@@ -19,7 +19,7 @@ from tussle.api import (
     Publish,
 )
 from tussle.api.channel_map import ChannelMapParam, channel_outputs, write_channels
-from tussle.api.channels import DRIVEN_CHANNELS
+from tussle.api.channels import CHANNEL_UNITS
 from tussle.errors import ParameterError
 from tussle.plugins.stock.autonomy.joystick.device import JoystickDevice
 
@@ -49,7 +49,7 @@ class Joystick:
     publish_button_state = Param(False, structural=True, doc="Send JoystickButtons in every call.")
     button_topic = Param("joystick_buttons", doc="Topic of JoystickButtons.")
     button_network_name = Param("LocalNetwork", doc="Its network.")
-    for _channel, _unit in DRIVEN_CHANNELS.items():
+    for _channel, _unit in CHANNEL_UNITS.items():
         vars()[f"{_channel}_out"] = Output(_channel, unit=_unit, doc="Command.")
     joystick = Handle(doc="The device, opened for each entity.")
     buttons = Publish(JoystickButtons, topic_param="button_topic", network_param="button_network_name")
