@@ -168,21 +168,21 @@ class Block:
     name: str
     team: int = 0
     count: int = 1
-    position: tuple[float, ...] = (0.0, 0.0, 0.0)
-    variance: tuple[float, ...] = (100.0, 100.0, 0.0)
-    half_width: tuple[float, ...] = (0.0, 0.0, 0.0)
+    position: Sequence[float] = (0.0, 0.0, 0.0)
+    variance: Sequence[float] = (100.0, 100.0, 0.0)
+    half_width: Sequence[float] = (0.0, 0.0, 0.0)
     placement: str = "normal"
     scatter_first: bool = False
     heading: float = 0.0
     heading_variance: float = 0.0
     climb: float = 0.0
     roll: float = 0.0
-    velocity: tuple[float, ...] | None = None
+    velocity: Sequence[float] | None = None
     speed: float = 0.0
     health: float = 1.0
     radius: float = 1.0
     mass: float = 1.0
-    box: tuple[float, ...] | None = None
+    box: Sequence[float] | None = None
     rate: float | None = None
     slots: int = 1
     first_birth: float = 0.0

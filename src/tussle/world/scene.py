@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -128,11 +128,11 @@ class Scene:
 
     origin: Origin = field(default_factory=Origin)
     ground: FlatGround | None = None
-    walls: tuple[Volume, ...] = ()
+    walls: Sequence[Volume] = ()
     boundaries: Mapping[int | str, Volume] = field(default_factory=dict)
-    bases: tuple[Base, ...] = ()
+    bases: Sequence[Base] = ()
     terrain: HeightField | None = None
-    meshes: tuple[TriangleMesh, ...] = ()
+    meshes: Sequence[TriangleMesh] = ()
 
     def __post_init__(self) -> None:
         for name, kind in (("walls", Volume), ("bases", Base), ("meshes", TriangleMesh)):
