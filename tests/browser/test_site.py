@@ -57,5 +57,5 @@ def test_search_finds_a_public_name(watched, address):
     tab.goto(address, wait_until="networkidle")
     tab.fill("input.md-search__input", "load_batch")
     found = tab.locator(".md-search-result__item a").first
-    found.wait_for()
+    found.wait_for(timeout=300_000)  # the index of all pages is read first, which a busy machine does slowly
     assert "reference/tussle.batch/" in found.get_attribute("href")
