@@ -20,8 +20,8 @@ def resident(process="self"):
     return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
 
 
-def grown(executor, directory, n_runs):
-    """Memory of this process, and of those that play, after a thousand runs and at the last [MB]."""
+def grown(executor, directory, n_runs, first=1):
+    """How much memory of this process, and of those that play, grows from the first thousands of runs to the last [MB]."""
     seen = []
 
     def watch(progress):
@@ -30,7 +30,7 @@ def grown(executor, directory, n_runs):
             seen.append((resident(), max(children, default=0.0)))
 
     Batch(game(), runs=n_runs).play(directory, executor, on_progress=watch)
-    return [last - first for first, last in zip(seen[0], seen[-1], strict=True)]
+    return [last - before for before, last in zip(seen[first - 1], seen[-1], strict=True)]
 
 
 @pytest.mark.slow
@@ -42,4 +42,5 @@ def test_ten_thousand_runs(tmp_path):
 
 @pytest.mark.slow
 def test_ten_thousand_runs_in_memory_take_two_kilobytes_each():
-    assert grown(InProcess(), None, 10_000)[0] < 9 * 2.0 + 2 * MAX_GROWTH
+    # The second thousand is played in a larger stack, which takes 25 MB once.
+    assert grown(InProcess(), None, 10_000, first=2)[0] < 8 * 2.0 + MAX_GROWTH
