@@ -26,7 +26,7 @@ from tussle.numeric.device_compiler import device_compiler, set_environments
 from tussle.numeric.fingerprint import Fingerprint, package
 
 Code = str | tuple[str, ...]
-FORMAT = 3  # version of the file format, part of every key
+FORMAT = 4  # version of the file format, part of every key
 LETTERS = {"F": np.float64, "I": np.int64, "B": np.bool_, "U": np.uint64, "S": np.float32}
 NUMBERS: dict[str, tuple[type, ...]] = {
     "f8": (float, int, np.floating, np.integer),
@@ -447,19 +447,29 @@ def save(name: str, key: str, result: Any) -> None:
     # Numba would store the module name and import the module on loading. A generated or user module may not be importable, and
     # its globals are only needed in object mode.
     environments = [(each.consts, each.env_name) for each in (main, *referenced)]
-    store.save(name, key, dumps((library, description, signature, environments)))
+    module = result.library._final_module
+    symbols = [
+        each.name
+        for each in (*module.functions, *module.global_variables)
+        if each.is_declaration and not each.name.startswith("llvm.")
+    ]
+    store.save(name, key, dumps((library, description, signature, environments, symbols)))
 
 
 def load(name: str, key: str, target_context: Any) -> Any:
     """Load a compile result from disk; None if there is none."""
+    from llvmlite import binding
     from numba.core.compiler import CompileResult
-    from numba.core.runtime import nrt  # noqa: F401  (defines symbols that the machine code links to)
+    from numba.core.runtime.nrt import rtsys
 
-    target_context.refresh()
     content = store.load(name, key)
     if content is None:
         return None
-    library, description, signature, environments = content
+    rtsys.initialize(target_context)
+    library, description, signature, environments, symbols = content
+    if not all(map(binding.address_of_symbol, symbols)):
+        # Numba's own functions on arrays, such as those of linear algebra. To load all of Numba takes half a second.
+        target_context.refresh()
     main, *referenced = [restored_environment(consts, env_name) for consts, env_name in environments]
     parts = (library, description, main, signature, False, (), "", (), tuple(referenced))
     return CompileResult._rebuild(target_context, *parts)

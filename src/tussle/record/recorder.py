@@ -18,6 +18,7 @@ from tussle.errors import MissionError, RecordError
 from tussle.mission import PluginFile, to_xml
 from tussle.mission.write import with_seed
 from tussle.record import run_file
+from tussle.record.arrow_values import arrow_array
 from tussle.record.events import BIRTH, END, Events
 from tussle.record.input_table import batch_of
 from tussle.record.inputs import ExternalInput
@@ -333,7 +334,7 @@ class Recorder:
             "other": np.concatenate([e.other for e in events]).astype(np.int32),
             "text": [text for e in events for text in e.text],
         }
-        arrays = [pa.array(columns[field.name], field.type) for field in EVENTS]
+        arrays = [arrow_array(columns[field.name], field.type) for field in EVENTS]
         return pa.RecordBatch.from_arrays(arrays, schema=EVENTS)
 
     # -- the end --------------------------------------------------------------------------------------------------------------

@@ -8,6 +8,7 @@ from typing import Any
 
 import pyarrow as pa
 
+from tussle.record.arrow_values import arrow_array
 from tussle.record.schema import RESULTS
 
 
@@ -62,6 +63,6 @@ class ResultRows:
         if not rows:
             return None
         arrays = [
-            pa.array(column, f.type) for column, f in zip(zip(*rows, strict=True), RESULTS, strict=True)
+            arrow_array(column, f.type) for column, f in zip(zip(*rows, strict=True), RESULTS, strict=True)
         ]
         return pa.RecordBatch.from_arrays(arrays, schema=RESULTS)

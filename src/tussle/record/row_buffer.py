@@ -8,6 +8,7 @@ import numpy as np
 import pyarrow as pa
 
 from tussle.api.bodies import FLOATS, STORED_INTS
+from tussle.record.arrow_values import arrow_array
 from tussle.record.plugin_columns import PluginColumn, Values
 from tussle.record.schema import FLOAT_COLUMNS, INT_COLUMNS, TRAJECTORY
 
@@ -69,7 +70,7 @@ class RowBuffer:
     ) -> None:
         self.start, self.dt, self._columns = start, dt, columns
         self.schema = pa.schema([*TRAJECTORY, *(part for column in columns for part in column.schema())])
-        self._blocks = pa.array(blocks, pa.string())
+        self._blocks = arrow_array(blocks, pa.string())
         self._allocate(capacity)
 
     def _allocate(self, capacity: int) -> None:
@@ -121,10 +122,10 @@ class RowBuffer:
         columns = dict(zip(FLOAT_COLUMNS, self._floats[:, :n], strict=True))
         columns |= dict(zip(INT_COLUMNS, self._ints[:, :n], strict=True))
         columns |= {"step": step, "t": self.start + step.astype(np.int64) * self.dt}  # as in the clock
-        arrays = {name: pa.array(column) for name, column in columns.items()}
+        arrays = {name: arrow_array(column) for name, column in columns.items()}
         arrays["block"] = pa.DictionaryArray.from_arrays(arrays["block"], self._blocks)
         for column, (values, has_value) in zip(self._columns, self._values, strict=True):
             mask = None if has_value[:n].all() else ~has_value[:n]
-            parts = (pa.array(part[:n], mask=mask) for part in values)
+            parts = (arrow_array(part[:n], mask=mask) for part in values)
             arrays |= dict(zip(column.parts, parts, strict=True))
         return pa.RecordBatch.from_arrays([arrays[name] for name in self.schema.names], schema=self.schema)

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
+from tussle.record.arrow_values import arrow_array
 from tussle.record.schema import SHAPES
 
 
@@ -47,7 +48,9 @@ class ShapeRows:
         rows, self._rows, self.n_characters = self._rows, [], 0
         if not rows:
             return None
-        arrays = [pa.array(column, f.type) for column, f in zip(zip(*rows, strict=True), SHAPES, strict=True)]
+        arrays = [
+            arrow_array(column, f.type) for column, f in zip(zip(*rows, strict=True), SHAPES, strict=True)
+        ]
         return pa.RecordBatch.from_arrays(arrays, schema=SHAPES)
 
     def close(self) -> None:

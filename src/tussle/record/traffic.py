@@ -11,6 +11,7 @@ import numpy as np
 import pyarrow as pa
 
 from tussle.errors import ParameterError, RecordError, listed, nearest_name
+from tussle.record.arrow_values import arrow_array
 from tussle.record.schema import FILES, LINKS
 
 MAX_LINKS = 1_000_000
@@ -106,7 +107,7 @@ class Traffic:
         columns: dict[str, Any] = dict(zip(LINKS.names, found, strict=True))
         columns["network"] = [names[i] for i in found[1].tolist()]
         columns["outcome"] = [self._outcomes[names[i]][k] for i, k in found[[1, 4]].T.tolist()]
-        arrays = [pa.array(columns[field.name]).cast(field.type) for field in LINKS]
+        arrays = [arrow_array(columns[field.name], field.type) for field in LINKS]
         return pa.RecordBatch.from_arrays(arrays, schema=LINKS)
 
     def end_step(self, t: np.ndarray, running: np.ndarray) -> None:

@@ -646,6 +646,25 @@ def test_same_names_from_files_of_different_processes_do_not_meet(project):
     assert project("import law\nprint(law.make(3.0)(1.0), law.make(2.0)(1.0))") == [3.0, 2.0]
 
 
+@pytest.mark.slow
+def test_loaded_kernels_find_what_their_machine_code_calls_and_load_no_compiler(project, tmp_path):
+    (tmp_path / "calls.py").write_text(
+        "import numpy as np\nfrom tussle.numeric.kernel import kernel\n"
+        "@kernel('f8 -> f8')\ndef plain(x):\n    return np.sqrt(x) ** 1.5 + np.floor(x) % 0.75\n"
+        "@kernel('F2 F -> f8')\ndef solved(a, b):\n    return np.linalg.solve(a, b)[1]\n"
+        "@kernel('f8 -> f8')\ndef drawn(x):\n    np.random.seed(3)\n    return np.random.normal(x, 0.0) + np.median(np.full(3, x))\n"
+        "@kernel('f8 -> f8')\ndef named(x):\n    values = {'a': x}\n    return values['a'] + len(str(int(x)))\n"
+    )
+    program = (
+        "import sys\nimport numpy as np\nfrom calls import *\nfrom tussle.numeric.kernel import stats\n"
+        "print(plain(16.0), int('numba.np.arraymath' in sys.modules))\n"
+        "print(solved(np.array([[2.0, 0.0], [0.0, 4.0]]), np.array([2.0, 3.0])), drawn(5.0), named(12.0), stats.loaded)"
+    )
+    values = [8.25, 1, 0.75, 10.0, 14.0, 0]
+    assert project(program) == values
+    assert project(program) == [8.25, 0, *values[2:5], 4]
+
+
 def test_a_tuple_of_arrays_is_one_argument():
     @kernel("(F I) (Fw Fw) i8 -> f8")
     def shared(own, out, k):

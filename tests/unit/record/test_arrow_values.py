@@ -1,0 +1,56 @@
+"""Arrow arrays as PyArrow makes them, without pandas."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import numpy as np
+import pyarrow as pa
+import pytest
+
+from tussle.record.arrow_values import arrow_array
+
+
+@pytest.mark.parametrize(
+    ("values", "kind"),
+    [
+        ([1.5, None, float("nan"), -0.0], pa.float64()),
+        ([True, None, False] * 5, pa.bool_()),
+        (["", None, "zwölf", "a\x00b"], pa.string()),
+        ((3, -4, None), pa.int32()),
+        (["a"], pa.string()),
+        ([], pa.string()),
+        ([], pa.float32()),
+        (np.arange(20, dtype=np.int32)[::3], pa.int64()),
+        (np.arange(9.0), None),
+        (np.arange(9) % 2 == 0, None),
+        (np.arange(12).reshape(3, 4)[:, 1], None),
+    ],
+)
+def test_arrays_equal_those_of_pyarrow(values, kind):
+    found, expected = arrow_array(values, kind), pa.array(values, kind)
+    found.validate(full=True)
+    assert found.type == expected.type
+    assert found.to_pylist().__repr__() == expected.to_pylist().__repr__()
+
+
+def test_masked_values_are_null():
+    values, mask = np.arange(11.0), np.arange(11) % 3 == 1
+    assert arrow_array(values, mask=mask).equals(pa.array(values, mask=mask))
+
+
+def test_numbers_that_do_not_fit_are_refused():
+    with pytest.raises(OverflowError):
+        arrow_array([2**31], pa.int32())
+
+
+def test_a_recorded_run_does_not_import_pandas(tmp_path):
+    program = (
+        "import sys\nfrom tussle.cli import main\n"
+        f"sys.argv = ['tussle', 'run', 'predator_prey', '--set', 'end=1', '--out', {str(tmp_path / 'run')!r}]\n"
+        "try:\n    main()\nexcept SystemExit as end:\n    assert not end.code\n"
+        "assert 'pandas' not in sys.modules and 'numba.np.arraymath' not in sys.modules"
+    )
+    subprocess.run([sys.executable, "-c", program], check=True, capture_output=True)
+    assert (tmp_path / "run" / "run.json").is_file()
