@@ -181,11 +181,12 @@ def hashed(state: SimulationState, world: int) -> Iterator[tuple[str, Any]]:
 
 
 def _hashed_columns(group: Group, binding: Binding, rows: np.ndarray) -> Iterator[tuple[str, Any]]:
+    unused = binding.spec.unused_states()
     for name, column in type(binding.spec).columns.items():
         is_memory = isinstance(column, (State, EntityRef)) or (
             isinstance(column, Output) and name in binding.wired
         )
-        is_memory &= name not in binding.spec.unused_states()
+        is_memory &= name not in unused
         label = ".".join((*binding.path, name))
         if is_memory and name in binding.ragged:
             lists = group.table.lists[binding.ragged[name]].take(rows)
