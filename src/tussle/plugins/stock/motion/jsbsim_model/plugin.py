@@ -92,6 +92,7 @@ class JSBSimAircraft(RigidBodyModel):
     commanded: ClassVar[tuple[str, ...]] = ()
     is_historic: ClassVar[bool] = False
     throttle_from: ClassVar[float] = 0.0
+    ground_of_origin: ClassVar[bool] = True
 
     script_name = Param(
         doc="File below `scripts` that names an aircraft, its start and its events.", default=""
@@ -178,7 +179,7 @@ class JSBSimAircraft(RigidBodyModel):
         loaded = Aircraft(
             own["jsbsim_root"], own["aircraft"], own["script_name"], own["trim"],
             flightgear if own["flightgear_output_enable"] else None, self.commanded, self.needed_properties,
-            self.is_historic, self.throttle_from,
+            self.is_historic, self.throttle_from, self.ground_of_origin,
         )  # fmt: skip
         flight = FlightHandle(self._fleet(row), row.scene.origin)
         flight.fleet.open(flight.number, loaded, row.dt)
