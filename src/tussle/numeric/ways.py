@@ -34,7 +34,7 @@ def is_passed(offset: Floats, way: Floats) -> np.ndarray:
     x, y, z = offset
     u, v, w = way
     along = -(x * u + y * v + z * w)
-    return (along > 0.0) & (along <= u * u + v * v + w * w)
+    return np.asarray((along > 0.0) & (along <= u * u + v * v + w * w))
 
 
 def turn(begin: Floats, end: Floats) -> Floats:
