@@ -13,6 +13,8 @@ import sys
 import tempfile
 
 from pages import OUTPUT, PAGES, examples, namespace, printed_by
+from parameters_page import PAGE as PARAMETERS
+from parameters_page import parameters_page
 from parity_page import PAGE as PARITY
 from parity_page import parity_page
 from plugin_pages import FOLDER, plugin_pages
@@ -49,6 +51,7 @@ def main() -> None:
         page.write_text(text)
     PAGE.write_text(reference())
     PARITY.write_text(parity_page())
+    PARAMETERS.write_text(parameters_page())
     PICTURE.write_text(picture())
     FOLDER.mkdir(exist_ok=True)
     for page, text in plugin_pages().items():

@@ -9,7 +9,10 @@ from pathlib import Path
 
 import pytest
 from pages import ROOT
+from parameters_page import PAGE as PARAMETERS
+from parameters_page import parameters_page
 from parity_page import KINDS, PAGE, SECTIONS, differences, parity_page, plugins_of, rows
+from scrimmage_parameters import table
 
 from tussle.plugins import historic, stock
 
@@ -72,6 +75,14 @@ def test_each_row_of_a_checklist_has_a_row_of_the_page():
 
 def test_the_page_is_what_is_declared_now():
     assert PAGE.read_text() == parity_page(), "python tests/docs/rewrite.py"
+
+
+def test_the_page_of_parameters_is_what_is_declared_now():
+    assert PARAMETERS.read_text() == parameters_page(), "python tests/docs/rewrite.py"
+    rows = PARAMETERS.read_text().splitlines()
+    for row in table():
+        found = [line for line in rows if line.startswith(f"| [{row.plugin}](") and f"`{row.name}`" in line]
+        assert found or row.state == "missing", row
 
 
 def test_each_law_of_scrimmage_has_its_row():

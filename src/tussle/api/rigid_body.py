@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-import warnings
 from typing import Any
 
 import numpy as np
@@ -64,8 +62,6 @@ class PositiveParam(Param):
         super().__init__(default, unit=unit, gt=0.0, doc=doc)
 
 
-MAX_START_RATE = 20.0
-"""Angular rate of an aircraft in its first second about an axis that is told [rad/s]: three turns a second."""
 RIGID_BODY = tuple(Number(f"rigid_body {k}") for k in range(13))
 """The state of a rigid body as numbers of a row kernel."""
 TO_COLUMNS = RowCall(
@@ -106,26 +102,6 @@ class RigidBodyModel(MotionModel):
     def to_body(self, body: MotionBody) -> None:
         """Write position, velocity, attitude and angular velocity."""
         kernels.write_rigid_bodies(self.rigid_body, body.table, body.first)
-
-    def warn_of_tumbling(self, body: MotionBody) -> None:
-        """Warn, once, of an aircraft that turns faster in its first second than aircraft do: its data or its start are wrong."""
-        rates = self.rigid_body[10:13]
-        if "_has_warned" in self.__dict__ or not (np.abs(rates) > MAX_START_RATE).any():
-            return
-        steps = body.step_count - body.born
-        fast = np.flatnonzero(
-            (np.abs(rates).max(axis=0) > MAX_START_RATE) & (steps * body.context.clock.dt < 1.0)
-        )
-        if len(fast):
-            self.__dict__["_has_warned"] = True
-            row = int(fast[0])
-            rate, t = math.degrees(np.abs(rates[:, row]).max()), body.context.clock.at(1.0)[body.world[row]]
-            warnings.warn(
-                f"{self.instance_name}: {body.who(row)} turns at {rate:.4g} deg/s at t = {t:g} s: it tumbles; look at its speed, attitude "
-                "and trim at the start, and at its engines",
-                RuntimeWarning,
-                stacklevel=2,
-            )
 
     def mass_properties(self, body: MotionBody) -> MassProperties:
         """As for other models; the inertia tensor is the first `InertiaParam`, if the model has one."""

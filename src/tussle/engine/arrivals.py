@@ -86,7 +86,7 @@ def _create(state: SimulationState, due: Mapping[int, np.ndarray], at_start: boo
         due: Block number -> world of each entity, (m,).
         at_start: The worlds are being reset.
     """
-    rejecting = [r for r in state.interactions if type(r.plugin).rejects is not Interaction.rejects]
+    rejecting = _rejecting(state)
     placed: dict[int, list[np.ndarray]] = {}
 
     def occupied(world: int) -> np.ndarray:
@@ -96,7 +96,7 @@ def _create(state: SimulationState, due: Mapping[int, np.ndarray], at_start: boo
         return np.concatenate([np.zeros((3, 0)), *here, *placed.get(world, [])], axis=1)
 
     def rejects(world: int, pos: np.ndarray, others: np.ndarray) -> bool:
-        return any(r.plugin.rejects(r.view, world, pos, others) for r in rejecting)
+        return bool(_who_rejects(rejecting, world, pos, others))
 
     def fail(world: int, error: MissionError) -> None:
         if at_start and state.n_worlds == 1:
@@ -120,6 +120,21 @@ def _create(state: SimulationState, due: Mapping[int, np.ndarray], at_start: boo
         kept = np.flatnonzero(is_there)
         new = Bodies(new.floats.take(kept, axis=1), new.ints.take(kept, axis=1), new.n_worlds)
     return in_order(new) if new.n or (at_start and due) else None
+
+
+def _rejecting(state: SimulationState) -> list[WorldBinding]:
+    return [r for r in state.interactions if type(r.plugin).rejects is not Interaction.rejects]
+
+
+def _who_rejects(rejecting: list[WorldBinding], world: int, pos: np.ndarray, taken: np.ndarray) -> str:
+    names = (r.spec.instance_name for r in rejecting if r.plugin.rejects(r.view, world, pos, taken))
+    return next(names, "")
+
+
+def who_rejects(state: SimulationState, world: int, pos: np.ndarray) -> str:
+    """Return the name of the interaction that rejects an entity at a position [m], (3,), of a world as it is now; "" if none does."""
+    bodies = state.population.bodies
+    return _who_rejects(_rejecting(state), world, pos, bodies.pos[:, bodies.world == world])
 
 
 def spawn_due(state: SimulationState) -> None:

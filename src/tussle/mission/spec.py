@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import inspect
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -116,13 +117,24 @@ def _check_names(where: str, kind: Any, given: Iterable[str]) -> None:
             raise MissionError(f"{where} has no {name!r}{nearest_name(name, names)}; {listed(names)}")
 
 
+EXAMPLES = {"name": 'name="prey"', "blocks": 'blocks=[Block(name="prey", motion=Unicycle())]'}
+"""Arguments that must be given, as one writes them."""
+
+
 def _named(kind: type[T]) -> type[T]:
-    """Decorator of a dataclass: an unknown argument raises a MissionError with the nearest right name."""
+    """Decorator of a dataclass: an unknown or a missing argument raises a MissionError with its name."""
     construct = kind.__init__
+    _, *others = inspect.signature(construct).parameters.values()
+    needed = [each.name for each in others if each.default is each.empty]
 
     @functools.wraps(construct)
     def checked(self: Any, **values: Any) -> None:
         _check_names(kind.__name__, kind, values)
+        for name in needed:
+            if name not in values:
+                raise MissionError(
+                    f"a {kind.__name__} needs {name}, such as {kind.__name__}({EXAMPLES[name]})"
+                )
         construct(self, **values)
 
     kind.__init__ = checked  # type: ignore[method-assign]
@@ -223,7 +235,8 @@ class Block:
         return (*self.autonomy, *self.controller, self.motion, *self.sensor)
 
     def __repr__(self) -> str:
-        return displayed.block_line(self)
+        # A debugger also shows a block that could not be made.
+        return displayed.block_line(self) if "motion" in vars(self) else object.__repr__(self)
 
     def _repr_html_(self) -> str:
         return displayed.block_html(self)

@@ -29,10 +29,18 @@ def closest_approach(offset: Floats, way: Floats, first: Floats | float = 0.0) -
     return part, np.sqrt(x * x + y * y + z * z)
 
 
+def is_passed(offset: Floats, way: Floats) -> np.ndarray:
+    """Whether a point that moves straight from `offset` to `offset + way` [m], (3, n) each, comes nearer to 0 and then no more, (n,)."""
+    x, y, z = offset
+    u, v, w = way
+    along = -(x * u + y * v + z * w)
+    return np.asarray((along > 0.0) & (along <= u * u + v * v + w * w))
+
+
 def turn(begin: Floats, end: Floats) -> Floats:
     """Angle from directions `begin` to `end`, (2, n) or more each, counter-clockwise from above [rad], (n,)."""
     angle: Floats = atan2(begin[0] * end[1] - begin[1] * end[0], begin[0] * end[0] + begin[1] * end[1])
     return angle
 
 
-__all__ = ["closest_approach", "turn"]
+__all__ = ["closest_approach", "is_passed", "turn"]

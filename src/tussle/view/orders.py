@@ -11,6 +11,7 @@ import numpy as np
 
 from tussle.declare.columns import Column, EntityRef, Handle, Numbers, Param, Subscribe
 from tussle.declare.messages import Message
+from tussle.engine.arrivals import who_rejects
 from tussle.engine.births import VALUES
 from tussle.engine.group import Binding, Group
 from tussle.engine.simulation import Simulation
@@ -155,7 +156,7 @@ def birth_fields(
         n_asked: Number of entities that were asked for before this step.
 
     Raises:
-        ParameterError: There is no such block, or the world has no space.
+        ParameterError: There is no such block, the world has no space, or an interaction rejects the position.
     """
     state = simulation.state
     names, births = list(state.world_view.templates), state.births
@@ -169,6 +170,9 @@ def birth_fields(
         raise ParameterError(
             f"spawn: world {world} has its most entities; allow_large of the mission raises the limit"
         )
+    if name := who_rejects(state, world, pos):
+        x, y, z = pos
+        raise ParameterError(f"spawn: no entity can be at {x:g} {y:g} {z:g} m: {name} rejects the position")
     spec = births.overrides.mission.blocks[names.index(block)]
     values = births.overrides.block_values(spec, VALUES, np.array([world]))
     heading, climb, roll, speed = values[:4, 0]

@@ -260,7 +260,7 @@ class Player:
         """Ask for an entity of a block at a position [m], (3,).
 
         Raises:
-            ParameterError: There is no such block, or the world has no space.
+            ParameterError: There is no such block, the world has no space, or an interaction rejects the position.
         """
         asked = [g for g in self.injections if isinstance(g, Injection) and g.type is SpawnEntity]
         n_asked = sum(given.step == self.step for given in asked)

@@ -154,9 +154,9 @@ def scenery_of(
 
 
 def _has_ground(mission: Mission, hills: HeightField | None) -> bool:
-    """Return True if the scene has a ground or a terrain, or a plugin a ground level."""
+    """Return True if the scene has a ground or a terrain, which may be a mesh, or a plugin a ground level."""
     levels = (name for p in mission.interactions for name in p.values if name.startswith("ground_"))
-    return mission.scene.ground is not None or hills is not None or any(levels)
+    return mission.scene.ground is not None or hills is not None or bool(mission.scene.meshes) or any(levels)
 
 
 def _start(block: Block) -> list[np.ndarray]:

@@ -1,6 +1,6 @@
 """The parameters of SCRIMMAGE's plugins (2025) and their defaults, and what becomes of each by its laws here.
 
-`scrimmage_parameters.csv` has a line per parameter: the plugin, the parameter, whether the default is that of the plugin's file or that of
+`parameters.csv` has a line per parameter: the plugin, the parameter, whether the default is that of the plugin's file or that of
 the call that reads it, the default, its state here, and for the states `unread`, `differs` and `refused` the reason.
 """
 
@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import csv
 from pathlib import Path
+from types import ModuleType
 from typing import Any, NamedTuple
 
 import pytest
@@ -17,7 +18,7 @@ from tussle.errors import TussleError
 from tussle.mission.catalogue import historic as attributes
 from tussle.plugins import historic, stock
 
-FILE = Path(__file__).with_suffix(".csv")
+FILE = Path(historic.__file__).with_name("parameters.csv")
 
 
 class Parameter(NamedTuple):
@@ -37,8 +38,8 @@ def table() -> list[Parameter]:
         return [Parameter(*row) for row in list(csv.reader(file))[1:]]
 
 
-def state_of(plugin: str, name: str, default: str) -> str:
-    """Return what becomes of a parameter.
+def state_of(plugin: str, name: str, default: str, law: ModuleType = historic) -> str:
+    """Return what becomes of a parameter by the laws of `historic` or `stock`.
 
     same: It has the same default. differs: It has another one. inside: It is a list of plugins. chosen: It names the plugin, or a class
     or function of a plugin file, or is passed on to it. unread: It is ignored with a note. viewer: It is kept for the viewer. refused: It
@@ -46,7 +47,7 @@ def state_of(plugin: str, name: str, default: str) -> str:
     """
     if plugin not in stock.manifest():
         return "missing"
-    cls = historic.load(plugin)
+    cls = law.load(plugin)
     known, drawn = cls.historic_attributes, attributes()["viewer"]
     parameter = known.renamed.get(name, name)
     for joined, parts in known.joined.items():

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from tussle import Block, Mission, Scene, Simulation
 from tussle.api import Autonomy, Output
-from tussle.stock import JSBSimControl
+from tussle.plugins.stock.motion import jsbsim_model
+from tussle.stock import JSBSimControl, JSBSimModel, JSBSimModelControllerHeadingPID, Straight
 from tussle.world.geodesy import Origin
 
 jsbsim = pytest.importorskip("jsbsim")
@@ -96,3 +98,25 @@ def test_a_snapshot_continues_such_a_flight():
         simulation.restore(saved)
         simulation.step(20)
         assert (simulation.read("a.pos")[0] == straight).all()
+
+
+def test_the_ground_is_that_of_the_origin_for_one_model_and_the_sea_for_the_other():
+    """SCRIMMAGE's Boids ask an aircraft of JSBSimModel for the height of the origin, at which it flies on."""
+    hawk = JSBSimModel(
+        script_name="patrol.xml", jsbsim_root=str(Path(jsbsim_model.__file__).with_name("hawk"))
+    )
+    blocks = [
+        Block(
+            name="low", position=(0.0, 0.0, -20.0), motion=hawk, autonomy=Straight(speed=25.0),
+            controller=JSBSimModelControllerHeadingPID(),
+        ),
+        Block(name="on_ground", position=(500.0, 0.0, 2.0), motion=JSBSimControl(aircraft="c172p"), autonomy=Stick()),
+    ]  # fmt: skip
+    with Simulation(Mission(blocks=blocks, scene=SCENE, dt=0.01, compat="scrimmage")) as simulation:
+        simulation.step(300)
+        (low,), (standing,) = (simulation.read(f"{name}.pos")[0][0] for name in ("low", "on_ground"))
+        handles = [group.motion.handles["flight"][0] for group in simulation.state.population.groups]
+        above = [handle.fleet.flights[handle.number].fdm["position/h-agl-ft"] / METRE for handle in handles]
+    assert low[2] == pytest.approx(-20.0, abs=5.0)
+    assert above == pytest.approx([low[2] + 100.0, standing[2]], abs=0.1)
+    assert standing[2] == pytest.approx(1.3, abs=1.0)

@@ -171,6 +171,14 @@ def test_missions_that_cannot_be(values, message):
         Mission(**{"blocks": [block()], **values})
 
 
+def test_missing_arguments_are_named():
+    with pytest.raises(MissionError, match=r'^a Block needs name, such as Block\(name="prey"\)$'):
+        Block(team=1)
+    with pytest.raises(MissionError, match=r"^a Mission needs blocks, such as Mission\(blocks="):
+        Mission()
+    assert repr(Block.__new__(Block)).startswith("<")  # as a debugger shows it
+
+
 def test_unknown_arguments_are_refused():
     with pytest.raises(MissionError, match=r"Block has no 'sped' \(did you mean 'speed'\?\)"):
         block(sped=3)

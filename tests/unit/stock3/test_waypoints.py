@@ -287,6 +287,16 @@ def test_what_was_passed_before_the_list_came_is_not_reached():
     assert not sim.read("led.WaypointDispatcher.is_done")[0].any()
 
 
+@pytest.mark.parametrize("aside", [0.0, 0.25, 3.0])
+@pytest.mark.parametrize("speed", [10.0, 12.5])
+def test_with_the_tolerance_0_a_waypoint_is_reached_when_it_is_passed(speed, aside):
+    """Also at the end of a step, and at a distance; in SCRIMMAGE only in it."""
+    seen = passed(stock, [(10.0, aside), (25.0, aside), (30.0, aside), (100.0, 0.0)], speed, tolerance=0.0)
+    assert [seen.index(k) for k in (1, 2, 3)] == [math.ceil(10.0 * x / speed) for x in (10.0, 25.0, 30.0)]
+    assert seen[-1] == 3
+    assert passed(historic, [(3.3, aside), (100.0, 0.0)], speed, tolerance=0.0)[-1] == 0
+
+
 class Circle(Autonomy):
     """Flies round a place."""
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from tussle import Simulation
-from tussle.mission import Mission, read_mission, shipped_missions
+from tussle.mission import Block, Mission, read_mission, shipped_missions
 from tussle.plugins import stock
-from tussle.scene import Scene
+from tussle.scene import Scene, TriangleMesh
 from tussle.view import scenery_of
 from tussle.world.shapes import FlatGround
 
@@ -30,6 +30,14 @@ GROUNDED = [name for name, path in SOURCES.items() if is_grounded(read_mission(p
 def test_missions_with_a_ground_are_known():
     assert {"car_maze", "fixed_wing_6dof", "urban_quadrotors", "GroundCollision"} <= set(GROUNDED)
     assert not {"predator_prey", "underwater_survey", "Boids"} & set(GROUNDED)
+
+
+def test_a_terrain_that_is_a_mesh_is_a_ground():
+    """As <terrain> reads poly data of SCRIMMAGE."""
+    hill = TriangleMesh(((0.0, 0.0, 0.0), (9.0, 0.0, 0.0), (0.0, 9.0, 0.0)), ((0, 1, 2),))
+    blocks = [Block(name="a", autonomy=stock.Straight(), motion=stock.SingleIntegrator())]
+    assert not scenery_of(Mission(blocks=blocks)).has_ground
+    assert scenery_of(Mission(blocks=blocks, scene=Scene(meshes=[hill]))).has_ground
 
 
 @pytest.mark.parametrize("name", GROUNDED)

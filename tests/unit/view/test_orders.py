@@ -9,7 +9,17 @@ from tussle.errors import ParameterError
 from tussle.messages import Message, RoadGraph, TextMessage, WaypointList
 from tussle.mission import Limits
 from tussle.record import load_inputs
-from tussle.stock import GoTo, MotorSchemas, MoveToGoalMS, SingleIntegrator, Still, WaypointDispatcher
+from tussle.scene import Cuboid, Scene
+from tussle.stock import (
+    GoTo,
+    MotorSchemas,
+    MoveToGoalMS,
+    SceneCollision,
+    SimpleCollision,
+    SingleIntegrator,
+    Still,
+    WaypointDispatcher,
+)
 from tussle.view import Live
 from tussle.view.entity import entity_state
 from tussle.view.orders import MAX_ITEMS, MAX_TEXT, field_of, fields_from
@@ -247,3 +257,24 @@ def test_an_entity_that_cannot_be_added_is_told_and_changes_nothing():
         assert len(live.injections) == 2
         assert len(live.frame().id) == 4
         assert live.notes[-1].startswith("spawn: world 0 has its most entities")
+
+
+def test_an_entity_is_not_added_where_an_interaction_rejects_it():
+    """As at the start of a game: in a wall, near another entity."""
+    wall = Cuboid((50.0, 0.0, 0.0), (20.0, 20.0, 20.0))
+    mission = fleet(1).replace(
+        scene=Scene(walls=(wall,)),
+        interactions=(SceneCollision(), SimpleCollision(startup_collision_range=5.0)),
+    )
+    with (
+        Simulation(mission, [1, 2]) as simulation,
+        Live(simulation, 1, threaded=False, is_paused=True) as live,
+    ):
+        live.spawn("a", (50, 3, 0))
+        assert live.notes[-1] == "spawn: no entity can be at 50 3 0 m: SceneCollision rejects the position"
+        live.spawn("a", live.frame().pos[0] + (1.0, 0.0, 0.0))
+        assert live.notes[-1].endswith(": SimpleCollision rejects the position")
+        assert not live.injections
+        live.spawn("a", (50, 30, 0))
+        live.step(2)
+        assert len(live.frame().id) == 3

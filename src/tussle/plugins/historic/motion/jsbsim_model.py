@@ -59,11 +59,13 @@ class SphericalEarth(JSBSimAircraft):
 
 
 class JSBSimModel(SphericalEarth, jsbsim_model.JSBSimModel):
-    """JSBSimModel over a sphere. Its attitude besides the heading, and its velocity, are those of its script.
+    """JSBSimModel over a sphere. Its attitude besides the heading, its velocity and the height of the ground are those of its script.
 
-    An entity that is born with a velocity starts with it, with its own attitude, and without the step at the birth: so a recorded run is
-    begun again.
+    The ground is at sea level if the script says nothing else, so that aircraft fly below the origin. An entity that is born with a
+    velocity starts with it, with its own attitude, and without the step at the birth: so a recorded run is begun again.
     """
+
+    ground_of_origin = False
 
     def spawn(self, body: Any, rows: np.ndarray) -> None:
         """Place the aircraft of some rows."""

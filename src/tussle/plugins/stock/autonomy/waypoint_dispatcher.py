@@ -18,7 +18,7 @@ from tussle.api import (
     unit,
 )
 from tussle.declare.messages import WAYPOINT_MODES, Waypoint, WaypointList, WaypointStatus
-from tussle.numeric.ways import closest_approach, turn
+from tussle.numeric.ways import closest_approach, is_passed, turn
 
 FOLLOW_ONCE, BACK_AND_FORTH, LOITER, RACETRACK = range(len(WAYPOINT_MODES))
 
@@ -27,12 +27,12 @@ class WaypointDispatcher(Autonomy):
     """Follows a list of waypoints: publishes a `Waypoint` on the line from the last waypoint to the next.
 
     The point lies `lead_distance` ahead of the entity's projection onto the line, but never beyond the next waypoint. When the
-    straight way since the last step comes within the tolerance of a waypoint, the next one becomes current, and a `WaypointStatus` is
-    published; several may be passed in one step. A waypoint that the entity has circled `max_turns` times without reaching it, since it
-    lies inside the turning circle, is skipped: the status says so, and a warning is given. The list is flown once, back and forth,
-    or as a closed circuit (racetrack). With loiter it is flown once; then the entity circles around the last waypoint,
-    counter-clockwise at `loiter_radius`: the point lies `lead_distance` ahead on the tangent of that circle. A new list starts at its
-    first waypoint. Until that is reached, and at the end of a list, the line starts at the entity itself.
+    straight way since the last step comes within the tolerance of a waypoint, or, if that is 0, comes nearer and then no more, the next
+    one becomes current, and a `WaypointStatus` is published; several may be passed in one step. A waypoint that the entity has circled
+    `max_turns` times without reaching it, since it lies inside the turning circle, is skipped: the status says so, and a warning is
+    given. The list is flown once, back and forth, or as a closed circuit (racetrack). With loiter it is flown once; then the entity
+    circles around the last waypoint, counter-clockwise at `loiter_radius`: the point lies `lead_distance` ahead on the tangent of that
+    circle. A new list starts at its first waypoint. Until that is reached, and at the end of a list, the line starts at the entity itself.
 
     In SCRIMMAGE a waypoint was reached only if the entity was within the tolerance at the end of a step, and none was skipped. It
     published its status in every step at the end of a list, stayed one step longer at the turning points of
@@ -104,7 +104,8 @@ class WaypointDispatcher(Autonomy):
             offset[2], way[2] = flat * offset[2], flat * way[2]
             now, distance = closest_approach(offset, way, part)
             # After the first: those that are passed later.
-            is_there = (distance <= tolerance) & (is_first | (now > part))
+            is_near = (distance <= tolerance) | ((tolerance == 0.0) & is_passed(offset, way))
+            is_there = is_near & (is_first | (now > part))
             self._advance(rows[is_there])
             rows, begin, end, part = rows[is_there], begin[:, is_there], end[:, is_there], now[is_there]
             self.turned[rows] = 0.0

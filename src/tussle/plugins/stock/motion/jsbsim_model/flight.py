@@ -56,6 +56,7 @@ class Aircraft(NamedTuple):
         needed: Properties that the aircraft must have.
         is_historic: Fly as in SCRIMMAGE: over a sphere, with engines that the script starts, and commands that are set in each step.
         throttle_from: Time before which throttles stay closed [s].
+        ground_of_origin: The ground has the altitude of the origin; otherwise that of the script, by default the sea's.
     """
 
     root: str
@@ -67,6 +68,7 @@ class Aircraft(NamedTuple):
     needed: tuple[str, ...]
     is_historic: bool = False
     throttle_from: float = 0.0
+    ground_of_origin: bool = True
 
 
 STANDING = 1.0
@@ -127,7 +129,7 @@ class JSBSimFlight:
         Args:
             values: Values of the properties PLACE, MOTION and WIND, of which NaN stands for that of the script; the time of the world [s];
                 the number of steps that follow at once.
-            origin: Origin of the world frame; the ground has its altitude.
+            origin: Origin of the world frame.
 
         Raises:
             ParameterError: The aircraft cannot be trimmed.
@@ -135,7 +137,8 @@ class JSBSimFlight:
         self.history.append(((values, origin), array("d")))
         state, wind, (self.time, n_steps) = values[:12], values[12:15], values[15:]
         fdm, start = self.fdm, self.aircraft
-        fdm["ic/terrain-elevation-ft"] = origin.altitude / FOOT
+        if start.ground_of_origin:
+            fdm["ic/terrain-elevation-ft"] = origin.altitude / FOOT
         for name, value in zip(PLACE + MOTION, state, strict=True):
             if not math.isnan(value):
                 fdm[name] = value

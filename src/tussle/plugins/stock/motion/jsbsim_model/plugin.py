@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import warnings
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, ClassVar
@@ -40,6 +42,8 @@ ONLY_HERE = "trim", "wind", "on_failure", "processes", "flightgear_output_enable
 KNOT = float(units.NAUTICAL_MILE / 3600)  # [m/s]
 FORWARD_RIGHT_DOWN = np.array([[0.0], [1.0], [0.0], [0.0]])
 """Rotation between body axes forward, left, up and forward, right, down."""
+MAX_START_RATE = 20.0
+"""Angular rate of an aircraft in its first second about an axis that is told [rad/s]: three turns a second."""
 MIRRORED = np.array([[1.0], [-1.0], [-1.0]])
 """Signs that convert axes forward, right, down to forward, left, up, and back."""
 
@@ -88,6 +92,7 @@ class JSBSimAircraft(RigidBodyModel):
     commanded: ClassVar[tuple[str, ...]] = ()
     is_historic: ClassVar[bool] = False
     throttle_from: ClassVar[float] = 0.0
+    ground_of_origin: ClassVar[bool] = True
 
     script_name = Param(
         doc="File below `scripts` that names an aircraft, its start and its events.", default=""
@@ -174,7 +179,7 @@ class JSBSimAircraft(RigidBodyModel):
         loaded = Aircraft(
             own["jsbsim_root"], own["aircraft"], own["script_name"], own["trim"],
             flightgear if own["flightgear_output_enable"] else None, self.commanded, self.needed_properties,
-            self.is_historic, self.throttle_from,
+            self.is_historic, self.throttle_from, self.ground_of_origin,
         )  # fmt: skip
         flight = FlightHandle(self._fleet(row), row.scene.origin)
         flight.fleet.open(flight.number, loaded, row.dt)
@@ -259,7 +264,7 @@ class JSBSimAircraft(RigidBodyModel):
     def to_body(self, body: MotionBody) -> None:
         """Write the states, and end the worlds of aircraft that have failed."""
         super().to_body(body)
-        self.warn_of_tumbling(body)
+        self._warn_of_tumbling(body)
         self._report(body)
 
     def commands(self, u: np.ndarray) -> np.ndarray:
@@ -283,6 +288,26 @@ class JSBSimAircraft(RigidBodyModel):
         kernels.to_rigid_bodies(read, (origin.latitude, origin.longitude), FOOT, moving)
         place = origin.from_geodetic(np.stack([read[:, 0], read[:, 1], FOOT * read[:, 2]]))
         return np.concatenate([place, moving])
+
+    def _warn_of_tumbling(self, body: MotionBody) -> None:
+        """Warn, once, of an aircraft that turns faster in its first second than aircraft do: its data or its start are wrong."""
+        rates = self.rigid_body[10:13]
+        if "_has_warned" in self.__dict__ or not (np.abs(rates) > MAX_START_RATE).any():
+            return
+        steps = body.step_count - body.born
+        fast = np.flatnonzero(
+            (np.abs(rates).max(axis=0) > MAX_START_RATE) & (steps * body.context.clock.dt < 1.0)
+        )
+        if len(fast):
+            self.__dict__["_has_warned"] = True
+            row = int(fast[0])
+            rate, t = math.degrees(np.abs(rates[:, row]).max()), body.context.clock.at(1.0)[body.world[row]]
+            warnings.warn(
+                f"{self.instance_name}: {body.who(row)} turns at {rate:.4g} deg/s at t = {t:g} s: it tumbles; look at its speed, attitude "
+                "and trim at the start, and at its engines",
+                RuntimeWarning,
+                stacklevel=2,
+            )
 
     def _report(self, body: Any) -> None:
         """End the worlds of aircraft that have failed, or remove these."""
