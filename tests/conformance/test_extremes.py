@@ -16,9 +16,11 @@ OUTSIDE = ("MapGen2D", "GraphInteraction", "Learned", "JSBSimControl", "JSBSimMo
 """Plugins that need a file or a program."""
 
 STIFF = (
-    "RigidBody6DOF", "Multirotor", "FixedWing6DOF", "FixedWing6DOF-A-4D", "FixedWing6DOF-Rascal", "FixedWing6DOFRascal", "UUV6DOF",
+    "RigidBody6DOF", "Multirotor", "FixedWing6DOF", "FixedWing6DOF-A-4D", "FixedWing6DOF-Rascal", "FixedWing6DOFRascal",
 )  # fmt: skip
-"""Rigid bodies under forces: with masses and inertias near 0 no step is short enough, see `PositiveParam`. The engine tells it."""
+"""Rigid bodies under forces: with masses and inertias near 0 no step is short enough, see `PositiveParam`. Most of these are refused when
+the mission is built, see `tussle.engine.stiffness`; not those of which only an input tells: thrust, the torque on an inertia near 0,
+coefficients of surfaces of 1e30."""
 
 
 def playable() -> list[str]:

@@ -436,6 +436,12 @@ class Group:
         )
         self.x[:, rows] = x
 
+    def inputs_of_body(self) -> np.ndarray:
+        """Return the inputs of the motion model, (k, n), with 0 in place of what controllers write."""
+        u = self._stacked_inputs() if self.stacks_inputs else self.u.copy()
+        u[: len(self.u_rows)] = 0.0
+        return u
+
     def _stacked_inputs(self) -> np.ndarray:
         rows = [self.table.arrays[float][self.u_rows]]
         axes = {"x": 0, "y": 1, "z": 2}

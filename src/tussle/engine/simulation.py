@@ -29,6 +29,7 @@ from tussle.engine.schedule import compose
 from tussle.engine.snapshot import Snapshot, restore, snapshot, state_hash
 from tussle.engine.state import SimulationState
 from tussle.engine.step_end import remove_dead, world_result
+from tussle.engine.stiffness import check_stiffness
 from tussle.errors import MissionError, ParameterError, PluginError
 from tussle.mission import GivenMission, Mission, mission_of
 from tussle.mission.rekeys import Rekeys
@@ -100,6 +101,7 @@ class Simulation:
         try:
             self.reset(range(self.n_worlds))
             _ = self.schedule.calls
+            check_stiffness(self.state)
             for text in self.state.message_bus.network_mismatches():
                 warnings.warn(text, RuntimeWarning, stacklevel=2)
         except Exception:

@@ -1,0 +1,115 @@
+"""Refuses rigid bodies whose equations change too fast for the substeps of a mission."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tussle.api.motion import MotionModel
+from tussle.api.rigid_body import RigidBodyModel
+from tussle.engine.group import Group
+from tussle.engine.state import SimulationState
+from tussle.errors import MissionError
+
+MAX_GROWTH = 1e4
+"""Factor by which a substep may enlarge a small change of the state: a hundred substeps with it leave all numbers. The method of Runge
+and Kutta has it for a rate of 23 per substep, 8 times that at which it becomes unstable; the models that ship have less than 2."""
+SAFE_GROWTH = 2.0
+"""That of a value which is proposed; bodies that are unstable by nature, such as an aircraft without a tail, have more than 1."""
+CHANGE = 1e-6
+"""Size of a small change, relative to that of the number, and absolutely for small ones."""
+BISECTIONS = 60
+
+
+@dataclass
+class TrialSteps:
+    """Substeps that are tried with some rows of a group, whose inputs are 0.
+
+    Attributes:
+        group: The group.
+        dt: Length of a substep [s].
+        u: Inputs, (k, n); those of the body are its own.
+    """
+
+    group: Group
+    dt: float
+    u: np.ndarray
+
+    def growth(self, row: int, p: np.ndarray) -> float:
+        """Return the largest factor by which a substep of a row with parameters p, (q,), enlarges a change of its state."""
+        start = self.group.x[:, row]
+        m = len(start)
+        change = CHANGE * np.maximum(1.0, np.abs(start))
+        x = np.repeat(start[:, None], m + 1, axis=1)
+        x[range(m), range(m)] += change
+        given = [np.repeat(each[:, None], m + 1, axis=1) for each in (self.u[:, row], p)]
+        with np.errstate(all="ignore"):
+            self.group.integrate(x, *given, self.dt, 1)
+            jacobian = (x[:, :m] - x[:, m:]) / change
+        return (
+            float(np.abs(np.linalg.eigvals(jacobian)).max()) if np.isfinite(jacobian).all() else float("inf")
+        )
+
+    def reason(self, row: int) -> str:
+        """Return what makes a row too fast: a parameter with its value, the nearest one that is safe at the start, and its default."""
+        given, first = self.group.p[:, row], 0
+        for name, column in type(self.group.motion.spec).row_params().items():
+            k = max(1, len(column.fields))
+            better = given.copy()
+            better[first : first + k] = column.default
+            first += k
+            if self.growth(row, better) <= SAFE_GROWTH:
+                low, high = 0.0, 1.0  # the share of the default that is added
+                for _ in range(BISECTIONS):
+                    middle = 0.5 * (low + high)
+                    is_safe = self.growth(row, given + middle * (better - given)) <= SAFE_GROWTH
+                    low, high = (low, middle) if is_safe else (middle, high)
+                where = slice(first - k, first)
+                nearest = given[where] + high * (better[where] - given[where])
+                return f"{name} = {_text(given[where])} (its start alone takes {_text(nearest)}, the default is {_text(better[where])})"
+        return "several parameters"
+
+
+def check_stiffness(state: SimulationState) -> None:
+    """Refuse the worlds in which a rigid body at its start changes so fast that no substep can follow, such as one of nearly no mass.
+
+    Raises:
+        MissionError: There is one, in a stack of one world.
+        PluginError: There is one, in another stack whose errors are raised.
+    """
+    dt = state.mission.dt / state.mission.motion_multiplier
+    for group in state.population.groups:
+        cls = type(group.motion.spec)
+        if (
+            not group.n
+            or not issubclass(cls, RigidBodyModel)
+            or cls.derivative is None
+            or cls.advance is not MotionModel.advance
+        ):
+            continue
+        trial = TrialSteps(group, dt, group.inputs_of_body())
+        for row in _unlike_rows(group, trial.u):
+            if trial.growth(row, group.p[:, row]) > MAX_GROWTH:
+                name = f"{group.motion.spec.instance_name} of block {group.block_of(row)!r}"
+                text = (
+                    f"{name} changes too fast for substeps of {dt:g} s (dt / motion_multiplier), by {trial.reason(row)}; its numbers would "
+                    "not be finite after a few steps"
+                )
+                world = int(group.motion_view.world[row])
+                if state.n_worlds == 1:
+                    raise MissionError(text)
+                state.record_failure(world, state.error(world, text))
+
+
+def _unlike_rows(group: Group, u: np.ndarray) -> list[int]:
+    """The first row, the fastest, and those with the least and largest value of each parameter that differs."""
+    given = np.concatenate([group.p, u])
+    differs = given[(given != given[:, :1]).any(axis=1)]
+    speed = np.abs(group.x[3:6]).max(axis=0)
+    found = [0, int(speed.argmax()), *differs.argmin(axis=1).tolist(), *differs.argmax(axis=1).tolist()]
+    return sorted(set(found))
+
+
+def _text(values: np.ndarray) -> str:
+    return " ".join(f"{value:.3g}" for value in values)
