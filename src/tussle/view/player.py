@@ -285,7 +285,8 @@ class Player:
             raise ParameterError(f"drive: entity {who} has no channel that sticks can drive")
         wanted = [round(max(-1.0, min(1.0, stick)) * STICK_STEPS) / STICK_STEPS for stick in sticks]
         last = self._last_stick(who)
-        if last is not None and last.step <= self.step and last.fields["sticks"].tolist() == wanted:
+        is_held = last is not None and last.fields["is_on"] and last.step <= self.step
+        if last is not None and is_held and last.fields["sticks"].tolist() == wanted:
             return
         self._take_course(who)
         self._put_sticks(self.step, who, wanted)

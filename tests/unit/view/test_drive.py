@@ -63,6 +63,9 @@ def test_the_sticks_take_the_place_of_the_commands_and_give_them_back(live):
     live.step(2)
     assert not live.entity(1).is_driven
     assert speed_of(live, "car") == pytest.approx(3.0)
+    live.drive(1, (0.0, 0.0, 0.0))  # as a stick is that was given back
+    live.step(2)
+    assert live.entity(1).is_driven
 
 
 def test_a_stick_is_an_input_where_it_changes_and_one_a_step(live):
