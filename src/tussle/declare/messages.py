@@ -25,6 +25,7 @@ __all__ = [
     "FlagTaken",
     "GPSStatus",
     "GoalReached",
+    "ManualControl",
     "Message",
     "Messages",
     "PointCloud",
@@ -396,6 +397,14 @@ class CustomKeyPress(Message):
     """A user of the viewer pressed the key that is reserved for plugins; sender is 0."""
 
     key = Handle(doc="Name of the key.", is_text=True)
+
+
+class ManualControl(Message):
+    """An operator drives an entity: from the next step on the sticks set its channels, in place of its autonomies."""
+
+    entity = EntityRef(doc="Entity that is driven.")
+    is_on = Field(dtype=bool, doc="It is driven; else its autonomies have it back.")
+    sticks = Field("ahead left up", doc="Deflections, from -1 to 1; what they mean depends on its channels.")
 
 
 class RemoveEntity(Message):

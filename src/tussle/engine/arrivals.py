@@ -42,6 +42,8 @@ def reset(
     for world in chosen:
         state.results[world] = None
         state.parked.pop(int(world), None)
+    for key in [key for key in state.manual if mask[key[0]]]:
+        del state.manual[key]
     state.message_bus.drop_worlds(mask)
     view.births = [
         {k: v if k == "block" else v[..., ~mask[b["world"]]] for k, v in b.items()} for b in view.births

@@ -8,8 +8,9 @@ import numpy as np
 
 from tussle.api.links import Links
 from tussle.declare.comms import EVERYONE, SAME_ENTITY, TopicBuffer
-from tussle.declare.messages import Messages, RemoveEntity, SpawnEntity
+from tussle.declare.messages import ManualControl, Messages, RemoveEntity, SpawnEntity
 from tussle.engine import failure
+from tussle.engine.manual import request_control
 from tussle.engine.state import SimulationState
 from tussle.engine.world_bindings import WorldBinding
 from tussle.errors import ParameterError, WiringError, listed, nearest_name
@@ -25,6 +26,8 @@ def deliver(state: SimulationState) -> None:
                 _request_births(state, topic.outbox())
             if topic.type is RemoveEntity:
                 _request_deaths(state, topic.outbox())
+            if topic.type is ManualControl:
+                request_control(state, topic.outbox())
             state.events.published(topic)
             if topic.inboxes or state.networks[topic.network].plugin.losses:
                 sent.setdefault(topic.network, []).append(topic)

@@ -15,6 +15,7 @@ from tussle.engine import failure
 from tussle.engine.calls import Call
 from tussle.engine.delivery import deliver
 from tussle.engine.group import Binding, Group
+from tussle.engine.manual import manual_calls
 from tussle.engine.rows import apply_moves
 from tussle.engine.state import SimulationState
 from tussle.engine.steering import Steering, steering_of
@@ -50,7 +51,8 @@ def compose(state: SimulationState) -> list[Call]:
         turns = []
         for group in groups:
             decides = [_entity_call(state, "autonomy", group, b) for b in group.autonomies]
-            turns.append((group, [*decides, *_motion(state, [group])]))
+            takes, returns = manual_calls(state, group)
+            turns.append((group, [*decides, *takes, *_motion(state, [group]), *returns]))
         if state.mission.update in SHUFFLED:
             names = dict.fromkeys(name for _, own in turns for call in own for name in call.names)
             calls.append(Call("each entity in random order", partial(_take_turns, state, turns), (*names,)))
@@ -60,7 +62,10 @@ def compose(state: SimulationState) -> list[Call]:
     else:
         for group in groups:
             calls += [_entity_call(state, "autonomy", group, b) for b in group.autonomies]
+        manual = [manual_calls(state, group) for group in groups]
+        calls += [call for takes, _ in manual for call in takes]
         calls += _motion(state, groups)
+        calls += [call for _, returns in manual for call in returns]
     for group in groups:
         calls += [_entity_call(state, "sensor", group, b) for b in group.sensors]
     if state.interactions:

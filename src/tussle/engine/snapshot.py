@@ -12,6 +12,7 @@ import numpy as np
 
 from tussle.declare.columns import EntityRef, Handle, Output, State
 from tussle.engine.group import Binding, Group
+from tussle.engine.manual import manual_columns
 from tussle.engine.rows import rows_changed
 from tussle.engine.state import SimulationState
 from tussle.errors import SnapshotError
@@ -47,6 +48,7 @@ def snapshot(state: SimulationState) -> Snapshot:
         "results": list(state.results),
         "parked": dict(state.parked),
         "rekeys": dict(state.rekeys),
+        "manual": dict(state.manual),
         "births": copy.deepcopy(
             (
                 births.next_id,
@@ -109,6 +111,9 @@ def restore(state: SimulationState, saved: Snapshot) -> None:
     state.running[:], state.failed[:] = world["running"], world["failed"]
     state.results, state.parked = list(world["results"]), dict(world["parked"])
     state.rekeys = dict(world["rekeys"])
+    if bool(state.manual) != bool(world["manual"]):
+        population.on_new_group()
+    state.manual = dict(world["manual"])
     state.world_view.births = list(world["requested_births"])
     state.world_view.deaths, state.world_view.moved = [], []  # requested in an interrupted step
     state.overrides.restore(world["params"])
@@ -160,6 +165,8 @@ def hashed(state: SimulationState, world: int) -> Iterator[tuple[str, Any]]:
         if mine.any():
             yield "wish", f"{request['block']} {mine.sum()}".encode()
             yield from ((k, array[..., mine]) for k, array in request.items() if k not in ("block", "world"))
+    if (driven := manual_columns(state, world)).size:
+        yield "manual", driven
     for name in HASHED:
         yield name, getattr(bodies, name)[..., rows]
     parts = []

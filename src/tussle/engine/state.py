@@ -74,6 +74,7 @@ class SimulationState:
         results: Result of each world that has ended or failed.
         parked: World -> its last rows, for those that have ended.
         rekeys: World -> its re-keys, for worlds that have some.
+        manual: (world, id) -> deflections of the sticks, for entities that an operator drives.
         has_failures: A world has failed since dead entities were last removed.
         has_changed: Entities were added or removed since the end conditions were last checked.
         checked: Columns that are checked at the end of a step, and the mask of faulty rows, (n,).
@@ -98,6 +99,7 @@ class SimulationState:
         self.results: list[WorldResult | None] = [None] * n
         self.parked: dict[int, Parked] = {}
         self.rekeys: dict[int, Rekeys] = {}
+        self.manual: dict[tuple[int, int], tuple[float, ...]] = {}
         self.has_failures, self.has_changed, self.by_substep = False, True, False
         clock = Clock(n, mission.start, mission.dt)
         keys = np.array([s % 2**64 for s in seeds], np.uint64)

@@ -15,6 +15,7 @@ from tussle.declare.comms.topic import Delivery, TopicBuffer
 from tussle.declare.lists import RaggedColumn
 from tussle.declare.messages import Messages
 from tussle.engine.group import Group
+from tussle.engine.manual import axes_of
 from tussle.engine.simulation import Simulation
 from tussle.engine.table import Stored, Table
 from tussle.view.orders import OrderKind, orders_of
@@ -76,6 +77,8 @@ class EntityState:
         received: Messages that have arrived and are unread, at most 50.
         sent: Its messages that are under way or unread, at most 50.
         orders: Messages that its plugins take and that can be typed.
+        axes: Axis of an operator's sticks -> the channels that it drives; empty for an entity that cannot be driven.
+        is_driven: An operator drives it.
     """
 
     t: float
@@ -88,6 +91,8 @@ class EntityState:
     received: list[ShownMessage] = field(default_factory=list)
     sent: list[ShownMessage] = field(default_factory=list)
     orders: list[OrderKind] = field(default_factory=list)
+    axes: dict[str, list[str]] = field(default_factory=dict)
+    is_driven: bool = False
 
 
 def entity_state(
@@ -124,6 +129,7 @@ def entity_state(
         team=int(bodies.team[row]),
         block=simulation.state.context.block_names[int(bodies.block[row])],
         body=body,
+        is_driven=(world, who) in simulation.state.manual,
     )
     for group in simulation.state.population.groups:
         if parked is None:
@@ -131,6 +137,7 @@ def entity_state(
                 _read_plugins(group, row - group.first, group.table, state.plugins)
                 state.received.extend(_received(group, world, who) if has_messages else ())
                 state.orders.extend(orders_of(group) if has_messages else ())
+                state.axes.update(axes_of(group) if has_messages else {})
         elif group.key in parked.tables:
             rows, held = parked.tables[group.key]
             place = np.flatnonzero(rows == row)

@@ -224,6 +224,17 @@ class Live:
         ids = tuple(map(int, entities))
         self._give(lambda: self._playback.set_parameter(path, value, ids))
 
+    def drive(self, who: int, sticks: Sequence[float] | None) -> None:
+        """Drive an entity in place of its autonomies from the next step on, see `tussle.engine.manual`. Errors appear in `notes`.
+
+        Args:
+            who: Its id.
+            sticks: Deflections ahead, left and up, from -1 to 1; None gives it back to its autonomies.
+        """
+        self._check_is_own()
+        player = self._player
+        self._give((lambda: player.release(who)) if sticks is None else (lambda: player.drive(who, sticks)))
+
     def remove(self, entities: Iterable[int]) -> None:
         """Remove entities at the end of the next step."""
         for who in entities:

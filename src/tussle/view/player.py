@@ -9,9 +9,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tussle.declare.displays import counted
-from tussle.declare.messages import Message, Messages, SpawnEntity
+from tussle.declare.messages import ManualControl, Message, Messages, SpawnEntity
 from tussle.engine.delivery import check_order
+from tussle.engine.manual import axes_of
 from tussle.engine.simulation import Simulation
+from tussle.errors import ParameterError
 from tussle.record import Events
 from tussle.view.curves import GameCurves
 from tussle.view.frame import Event, frame_of
@@ -21,6 +23,8 @@ from tussle.view.timeline import History, Timeline
 if TYPE_CHECKING:
     from tussle.record import ExternalInput, Recorder
 
+STICK_STEPS = 127
+"""Steps of a stick from its middle to its end."""
 MAX_EVENTS = 100_000
 """Events up to which collisions are kept."""
 
@@ -266,9 +270,51 @@ class Player:
         n_asked = sum(given.step == self.step for given in asked)
         self.publish(SpawnEntity, "", "", birth_fields(self.simulation, self.world, block, pos, n_asked))
 
-    def _take_course(self) -> None:
-        """Drop what lies in the future: something comes from outside before the next step."""
+    def drive(self, who: int, sticks: Sequence[float]) -> None:
+        """Drive an entity from the next step on, with deflections ahead, left and up from -1 to 1.
+
+        Raises:
+            ParameterError: There is no such entity, or it cannot be driven.
+        """
+        population = self.simulation.state.population
+        (row,) = population.bodies.rows_of(np.array([self.world]), np.array([who]))
+        group = next((g for g in population.groups if g.first <= row < g.last), None)
+        if self.is_over or group is None:
+            raise ParameterError(f"drive: world {self.world} has no entity {who} now")
+        if not axes_of(group):
+            raise ParameterError(f"drive: entity {who} has no channel that sticks can drive")
+        wanted = [round(max(-1.0, min(1.0, stick)) * STICK_STEPS) / STICK_STEPS for stick in sticks]
+        last = self._last_stick(who)
+        is_held = last is not None and last.fields["is_on"] and last.step <= self.step
+        if last is not None and is_held and last.fields["sticks"].tolist() == wanted:
+            return
+        self._take_course(who)
+        self._put_sticks(self.step, who, wanted)
+
+    def release(self, who: int) -> None:
+        """Give an entity back to its autonomies, after the furthest step that was played."""
+        last = self._last_stick(who)
+        if last is not None and last.fields["is_on"] and not self.is_over:
+            self._put_sticks(self.last_step, who, None)
+
+    def _last_stick(self, who: int) -> Injection | None:
+        mine = (g for g in reversed(self.injections) if isinstance(g, Injection) and g.type is ManualControl)
+        return next((g for g in mine if g.fields["entity"] == who), None)
+
+    def _put_sticks(self, step: int, who: int, sticks: list[float] | None) -> None:
+        """At most one `ManualControl` of an entity comes before a step."""
+        if (last := self._last_stick(who)) is not None and last.step == step:
+            self.injections.remove(last)
+        fields = {"entity": who, "is_on": sticks is not None, "sticks": np.array(sticks or [0.0] * 3)}
+        self.injections.append(Injection(step, ManualControl, fields=fields))
+
+    def _take_course(self, driven: int = 0) -> None:
+        """Drop what lies in the future: something comes from outside before the next step.
+
+        Nobody holds the sticks of entities that were driven then; they go back to their autonomies, but for the one that is `driven` now.
+        """
         step = self.step
+        is_new = step < self._furthest_step or any(given.step >= step for given in self._inputs)
         if dropped := [given for given in self._inputs if given.step >= step]:
             self._play_inputs([given for given in self._inputs if given.step < step])
             self.note(
@@ -281,6 +327,9 @@ class Player:
             self.injections[:] = [given for given in self.injections if given.step <= step]
             self._forget_events(step)
             self._furthest_step = step
+        for world, who in self.simulation.state.manual if is_new else ():
+            if world == self.world and who != driven:
+                self._put_sticks(step, who, None)
 
     def _play_inputs(self, inputs: Sequence[ExternalInput]) -> None:
         self._inputs = inputs

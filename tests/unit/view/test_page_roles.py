@@ -17,7 +17,7 @@ EVERYTHING = [
     ("pause", {}), ("resume", {}), ("step", {"n": 3}), ("seek", {"t": 0.0}), ("warp", {"value": 4.0}), ("faster", {}), ("slower", {}),
     ("reset", {"seed": 9}), ("point", {"pos": [1.0, 2.0, 0.0]}), ("key", {"key": ";"}), ("order", {"receivers": [1], **ORDER}),
     ("set", {"entities": [1], "path": "GoTo.speed", "value": 3.0}), ("remove", {"entities": [1]}),
-    ("spawn", {"block": "blue", "pos": [1.0, 2.0, 0.0]}),
+    ("drive", {"entities": [1], "sticks": [1.0, 0.0, 0.0]}), ("spawn", {"block": "blue", "pos": [1.0, 2.0, 0.0]}),
 ]  # fmt: skip
 
 
@@ -114,6 +114,37 @@ def test_an_operator_gives_orders_to_the_own_team(page):
     assert (goals[0] == (50, 0, 0)).all()
     assert np.array_equal(live.simulation.read("blue.GoTo.speed")[0][0], [10, 3])
     assert not live.simulation.read("red.GoTo.is_told")[0].any()
+
+
+def test_an_operator_drives_an_entity_until_the_browser_goes(page):
+    live, page = page
+    driven = lambda: {who for _, who in live.simulation.state.manual}  # noqa: E731
+
+    def wait_for(expected):
+        def is_so():
+            live.step(1)
+            return live.settle() and driven() == expected
+
+        return is_so
+
+    with PageClient(page.addresses[PageRole(OPERATE, 2)]) as client, PageClient(page.url) as other:
+        client.wait(lambda: client.status)
+        client.order("drive", entities=[3], sticks=[1.0, 0.0, 0.0])
+        client.wait(wait_for({3}))
+        assert (
+            refused(other, "drive", {"entities": [3], "sticks": [0.0, 0.0, 0.0]})
+            == "another browser drives entity 3"
+        )
+        for sticks in ([2.0, 0.0, 0.0], [1.0, 0.0], "north"):
+            assert refused(client, "drive", {"entities": [3], "sticks": sticks}).startswith("sticks")
+        client.order("drive", entities=[4], sticks=[1.0, 0.0, 0.0])
+        client.wait(wait_for({4}))
+        other.order("drive", entities=[1], sticks=[1.0, 0.0, 0.0])
+        other.wait(wait_for({1, 4}))
+        other.order("drive", entities=[1], sticks=None)
+        other.wait(wait_for({4}))
+        client.close()
+        other.wait(wait_for(set()))
 
 
 def test_one_steers_is_the_first_of_those_who_may(page):

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from tussle.documents import Checked, Either, Map, Maybe, Real, Rule, Whole, check_argument, problem
+from tussle.engine.manual import AXES
 from tussle.errors import ParameterError
 from tussle.view.live import Live
 
@@ -46,6 +47,15 @@ def _wanted_problem(value: list[Any], _: str) -> str:
 POINT = Either((Checked([COORDINATE], _point_problem),), "x, y, z in m")
 PAIRS = [Either((str, ID), "a name and an id")]
 WANTED = Either((Checked([PAIRS], _wanted_problem),), f"at most {MAX_WANTED} pairs of a name and an id")
+
+
+def _sticks_problem(value: list[Any], _: str) -> str:
+    return "" if len(value) == len(AXES) else "it has not three numbers"
+
+
+STICKS = Either(
+    (Maybe(Checked([Real(-1.0, 1.0)], _sticks_problem)),), "ahead, left, up from -1 to 1, or null"
+)
 IDS = Either((Checked([Whole(1, MAX_ID)], _ids_problem),), f"1 to {MAX_RECEIVERS} ids")
 TYPED = Map(
     Either((Real(), bool, str, [Either((Real(), bool, [Real()]), "numbers")]), "a number, a text or a list")

@@ -23,7 +23,7 @@ from tussle.view.frame import Event, Frame
 from tussle.view.live import Live
 from tussle.view.page.access import DIRECT, OPERATE, WATCH, PageRole
 from tussle.view.page.chunks import FULL_HEALTH, UNIT, pack, step_of
-from tussle.view.page.commands import ID, MAX_ID, WANTED, Command, game_commands, read_command
+from tussle.view.page.commands import ID, IDS, MAX_ID, STICKS, WANTED, Command, game_commands, read_command
 from tussle.view.page.document import event_rows
 from tussle.view.page.drawing import drawing_message
 from tussle.view.page.facts import mission_facts
@@ -69,6 +69,7 @@ class Reader:
         role: What it may do.
         chosen: Id of the entity whose state it reads; 0 for nobody.
         has_feed: It reads the messages of the game.
+        driven: Id of the entity that it drives; 0 for none.
         wake: There is something to be sent.
     """
 
@@ -76,6 +77,7 @@ class Reader:
         self.socket, self.role = socket, role
         self.chosen = 0
         self.has_feed = False
+        self.driven = 0
         self.wake = asyncio.Event()
         self.wake.set()
         self.frame_sent = self.drawn_sent = 0
@@ -199,6 +201,7 @@ class FramePublisher:
         finally:
             self.readers.remove(reader)
             sender.cancel()
+            self._drive(reader, [], None)
             if reader.wanted:
                 self._watch()
 
@@ -309,6 +312,8 @@ class FramePublisher:
             "sections": entity_sections(state),
             "quantities": quantities,
             "orders": orders,
+            "axes": state.axes,
+            "isDriven": state.is_driven,
         }
 
     # -- what they send ---------------------------------------------------------------------------------------------------------------
@@ -347,6 +352,11 @@ class FramePublisher:
             "choose": Command(reader.choose, {"id": ID}, steers=False),
             "listen": Command(reader.listen, {"is_on": bool}, steers=False),
             "want": Command(lambda wanted: self._want(reader, wanted), {"wanted": WANTED}, steers=False),
+            "drive": Command(
+                lambda entities, sticks: self._drive(reader, entities, sticks),
+                {"entities": IDS, "sticks": STICKS},
+                receivers="entities",
+            ),
             "history": Command(
                 lambda seconds: self._look_back(reader, seconds), {"seconds": Real(0.0, 1e9)}, steers=False
             ),
@@ -363,6 +373,21 @@ class FramePublisher:
                 self._refuse(reader, str(error))
             for each in self.readers:
                 each.status_due = 0.0
+
+    def _drive(self, reader: Reader, entities: list[int], sticks: list[float] | None) -> None:
+        """Drive an entity, the only one of a browser, or give it back.
+
+        Raises:
+            ParameterError: Another browser drives it.
+        """
+        who = entities[0] if entities and sticks is not None else 0
+        if who and any(each.driven == who for each in self.readers if each is not reader):
+            raise ParameterError(f"another browser drives entity {who}")
+        if reader.driven not in (0, who):
+            self._live.drive(reader.driven, None)
+        reader.driven = who
+        if who:
+            self._live.drive(who, sticks)
 
     def _refuse(self, reader: Reader, reason: str) -> None:
         """Report a rejected value; of consecutive ones, only the first."""

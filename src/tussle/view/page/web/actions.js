@@ -64,6 +64,7 @@ export function actionsOf(player) {
       const chosen = camera.undo();
       if (chosen !== null) player.choose(chosen, false);
     }),
+    drive: change(() => player.drive.toggle()),
     unchoose: change(() => {
       if (player.isPicking) return player.pick(false);
       if (byId('settings').hidden) player.choose(0);

@@ -38,6 +38,7 @@ const KEYS = [
     [['p'], 'pick a point on the ground and send it to the plugins', 'pick'],
     [[';'], 'send a key to the plugins', 'customKey'],
     [['f'], 'messages that plugins publish', 'feed'],
+    [['j'], 'drive the chosen entity with W A S D, E Q or a gamepad; Esc gives it back', 'drive'],
   ]],
   ['Page', [
     [['q'], 'quantities over time', 'quantities'],
@@ -71,7 +72,7 @@ export function fillHelp(box, isLive) {
 }
 
 /** Whether an element takes a key itself. @param {EventTarget | null} target @param {string} key */
-function takesKey(target, key) {
+export function takesKey(target, key) {
   if (!(target instanceof HTMLElement)) return false;
   if (target instanceof HTMLSelectElement || (target instanceof HTMLInputElement && ['number', 'text'].includes(target.type))) return true;
   if (target instanceof HTMLInputElement && target.type === 'range') return target.id !== 'time' && key.startsWith('Arrow');

@@ -12,6 +12,7 @@ import { EventLine } from './events.js';
 import { LiveClock, RecordedClock } from './timeline.js';
 import { Panels } from './panels.js';
 import { MessagePanel } from './feed.js';
+import { Drive } from './drive.js';
 import { OrderForm } from './orders.js';
 import { QuantityPanel } from './quantities.js';
 import { Steering } from './steering.js';
@@ -86,6 +87,7 @@ export class Player {
     this.events = new EventLine(layer, this.clock, (event) => this.jump(event));
     this.panels = new Panels(page, layer, this.hidden, () => this.look());
     this.orders = new OrderForm(this);
+    this.drive = new Drive(this);
     this.feed = new MessagePanel(this);
     this.quantities = new QuantityPanel(this);
     this.steering = new Steering(this.canvas, this);
@@ -142,7 +144,10 @@ export class Player {
   /** @param {Status} status */
   takeStatus(status) {
     if (!this.isLost) this.panels.showStatus(status, this.drawRate);
-    if (status.refusal) this.say(status.refusal);
+    if (status.refusal) {
+      this.drive.release();
+      this.say(status.refusal);
+    }
     this.look();
   }
 
@@ -204,6 +209,7 @@ export class Player {
     // A tab that was in the background does not make up for it.
     const seconds = Math.min((now - this.last) / 1000, 1);
     this.last = now;
+    this.drive.update();
     // Time waits for what has to be unpacked.
     if (this.isShown) {
       if (this.clock.isPlaying && !this.source.isLive) this.look();
@@ -243,6 +249,7 @@ export class Player {
     this.panels.showTeams(clock.t);
     this.panels.showChosen(this.chosen, this.camera.mode, clock.t);
     this.orders.show();
+    this.drive.show();
     this.feed.show();
     this.quantities.show(clock.t);
     this.events.update(clock.t);

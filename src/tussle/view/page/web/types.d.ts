@@ -47,7 +47,7 @@ export interface Status {
   events: { from: number; rows: EventRow[] }; refusal: string | null; steers: boolean; role: { kind: 'direct' | 'operate' | 'watch'; team: number | null };
   /** Topic, messages a second of the game, and the last message; null where it was not asked for. */
   feed: [string, number, string][] | null;
-  entity: { id: number; sections: Section[]; quantities: [string, string][]; orders: OrderKind[] } | null;
+  entity: { id: number; sections: Section[]; quantities: [string, string][]; orders: OrderKind[]; axes: Record<string, string[]>; isDriven: boolean } | null;
 }
 
 /** A field of an order: components by name, or a single value; their units. */

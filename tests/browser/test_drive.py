@@ -1,0 +1,83 @@
+"""An entity is driven by the keys of a browser, until it is given back."""
+
+import pytest
+from served import UNHURRIED, Watched
+
+from tussle import Block, Mission, Simulation
+from tussle.stock import GoTo, SingleIntegrator
+from tussle.view import Live
+from tussle.view.page.server import Page
+
+
+@pytest.fixture(scope="module")
+def game(chromium):
+    kind = {"motion": SingleIntegrator(max_speed=5.0), "autonomy": GoTo(speed=2.0)}
+    blocks = [Block(name="drone", team=1, count=2, position=(0, 0, 20), variance=(400, 400, 0), **kind)]
+    with (
+        Simulation(Mission(name="driven", blocks=blocks, end=3000.0, dt=0.1, end_conditions="time"), 3) as simulation,
+        Live(simulation, pace=1.0) as live, Page(live, viewer=UNHURRIED) as page,
+    ):  # fmt: skip
+        yield live, page, chromium
+
+
+@pytest.fixture
+def driver(game):
+    live, page, chromium = game
+    watched = Watched(chromium, page, {"width": 1100, "height": 760})
+    choose(watched, 1)
+    watched.wait("!document.querySelector('#drive').hidden")
+    yield live, watched
+    watched.close()
+    assert not watched.trouble, "\n".join(watched.trouble)
+
+
+def choose(watched, who):
+    """Choose an entity by a click on it."""
+    watched.wait(f"player.isDrawn && player.pixelOf({who})")
+    watched.tab.mouse.click(*watched.tab.evaluate(f"() => player.pixelOf({who})"))
+    watched.wait(f"player.chosen === {who}")
+
+
+def sticks(live):
+    return live.simulation.state.manual.get((0, 1))
+
+
+def test_keys_drive_it_and_escape_gives_it_back(driver):
+    live, watched = driver
+    watched.button("Take over")
+    watched.until(lambda: sticks(live) == (0.0, 0.0, 0.0))
+    watched.tab.keyboard.down("w")
+    watched.until(lambda: max(map(abs, sticks(live))) > 0.6)
+    # Ahead is away from who looks.
+    watched.until(lambda: abs(live.entity(1).body["vel"].value[:2]).max() > 3.0 if live.entity(1) else False)
+    watched.tab.keyboard.down("e")
+    watched.until(lambda: sticks(live)[2] == 1.0)
+    watched.tab.keyboard.up("w")
+    watched.tab.keyboard.up("e")
+    watched.until(lambda: sticks(live) == (0.0, 0.0, 0.0))
+    watched.wait("document.querySelector('#drive p').innerText.includes('velocity_y')")
+    assert watched.tab.get_by_label("Camera", exact=True).is_visible()
+    watched.tab.keyboard.press("Escape")
+    watched.until(lambda: sticks(live) is None)
+    assert watched.tab.evaluate("() => player.chosen") == 1
+
+
+def test_another_choice_gives_it_back(driver):
+    live, watched = driver
+    watched.press("j")
+    watched.until(lambda: sticks(live) is not None)
+    choose(watched, 2)
+    watched.until(lambda: sticks(live) is None)
+
+
+def test_a_gamepad_drives_it_and_closing_the_page_gives_it_back(driver):
+    live, watched = driver
+    watched.tab.evaluate("() => { navigator.getGamepads = () => [null, { axes: [0.05, 0, 0, -0.5] }]; }")
+    watched.press("j")
+    watched.until(lambda: sticks(live) == (0.0, 0.0, 64 / 127))
+    watched.tab.goto("about:blank")
+    for _ in range(3000):
+        if sticks(live) is None:
+            break
+        watched.tab.wait_for_timeout(30)
+    assert sticks(live) is None
