@@ -27,7 +27,7 @@ HEAD = """# Parameters of SCRIMMAGE's plugins
 What becomes of each parameter that a plugin of SCRIMMAGE (2025) reads, for those who move a mission over. The defaults there are
 those of the plugin's `.xml`, or where it has none those of the code that reads the parameter. [Parity](parity.md) lists the laws
 that differ; the page of [each plugin](plugins/index.md) has all its parameters here, with units. This page is written by
-`python tests/docs/rewrite.py` from `src/tussle/plugins/historic/parameters.csv`.
+`python tests/docs/rewrite.py` from `tests/docs/scrimmage_parameters.csv`.
 
 "no effect" means that the parameter is accepted, with a note; "error" that a mission which gives it is refused with a message that
 names it; "the same" that the default is that of SCRIMMAGE.

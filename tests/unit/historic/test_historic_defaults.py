@@ -102,7 +102,7 @@ def test_tiny_negative_errors_of_angles_are_zero(angle):
 
 
 def test_each_parameter_of_scrimmage_has_its_default():
-    """Or a reason why not; `parameters.csv` is the table."""
+    """Or a reason why not; `scrimmage_parameters.csv` is the table."""
     rows = table()
     assert [(r.plugin, r.name) for r in rows] == sorted({(r.plugin, r.name) for r in rows})
     wrong = [r for r in rows if state_of(r.plugin, r.name, r.default) != r.state]

@@ -1,6 +1,6 @@
 """The parameters of SCRIMMAGE's plugins (2025) and their defaults, and what becomes of each by its laws here.
 
-`parameters.csv` has a line per parameter: the plugin, the parameter, whether the default is that of the plugin's file or that of
+`scrimmage_parameters.csv` has a line per parameter: the plugin, the parameter, whether the default is that of the plugin's file or that of
 the call that reads it, the default, its state here, and for the states `unread`, `differs` and `refused` the reason.
 """
 
@@ -18,7 +18,7 @@ from tussle.errors import TussleError
 from tussle.mission.catalogue import historic as attributes
 from tussle.plugins import historic, stock
 
-FILE = Path(historic.__file__).with_name("parameters.csv")
+FILE = Path(__file__).with_suffix(".csv")
 
 
 class Parameter(NamedTuple):
