@@ -81,3 +81,20 @@ def test_a_gamepad_drives_it_and_closing_the_page_gives_it_back(driver):
             break
         watched.tab.wait_for_timeout(30)
     assert sticks(live) is None
+
+
+def test_taken_over_again_at_once_it_stays_driven_until_a_jump_in_time(driver):
+    live, watched = driver
+    for _ in range(2):
+        watched.press("j")
+        watched.until(lambda: sticks(live) is not None)
+        watched.press("Escape")
+        watched.until(lambda: sticks(live) is None)
+    # The state of the entity that the page has may still be that of the first time.
+    watched.press("j")
+    watched.until(lambda: sticks(live) is not None)
+    seen = live.step_number
+    watched.until(lambda: live.step_number > seen + 10)
+    assert sticks(live) is not None
+    live.seek(live.t - 0.4)
+    watched.until(lambda: sticks(live) is None)

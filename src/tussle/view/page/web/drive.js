@@ -26,7 +26,10 @@ export class Drive {
     this.box = byId('drive');
     /** Id of the entity that is driven; 0 for none. */
     this.who = 0;
-    this.isConfirmed = false;
+    /** Of the game when driving began: a jump in time ends it. */
+    this.epoch = -1;
+    /** Channels of the entity that is driven. @type {string[]} */
+    this.channels = [];
     this.sent = '';
     /** @type {Set<string>} */
     this.held = new Set();
@@ -57,15 +60,17 @@ export class Drive {
   }
 
   toggle() {
+    const { entity, player } = this;
     if (this.who) this.release();
-    else if (this.entity) {
-      this.who = this.player.chosen;
-      this.isConfirmed = false;
+    else if (entity && player.layer instanceof Live) {
+      this.who = player.chosen;
+      this.epoch = player.layer.epoch;
+      this.channels = Object.values(entity.axes).flat();
       this.sent = '';
       this.held.clear();
-      this.player.say(`You drive ${this.player.layer.who(this.who)}`);
+      player.say(`You drive ${player.layer.who(this.who)}`);
     }
-    this.player.look();
+    player.look();
   }
 
   /** Give the entity back to its autonomies. */
@@ -92,17 +97,18 @@ export class Drive {
   /** Send the sticks where they have changed; called in each frame. */
   update() {
     if (!this.who) return;
-    const { entity, player } = this;
-    if (player.chosen !== this.who || player.isLost || (this.isConfirmed && !entity?.isDriven)) {
+    const { player, who } = this;
+    const { layer } = player;
+    // Not by the state of the entity, which may be older than the command.
+    if (player.chosen !== who || player.isLost || !(layer instanceof Live) || layer.status.isOver || layer.epoch !== this.epoch || layer.slotOf(who) < 0) {
       this.release();
       return;
     }
-    this.isConfirmed ||= Boolean(entity?.isDriven);
-    const sticks = this.sticks(Object.values(entity?.axes ?? {}).flat()).map((x) => Math.round(STEPS * between(x, -1, 1)) / STEPS + 0);
+    const sticks = this.sticks(this.channels).map((x) => Math.round(STEPS * between(x, -1, 1)) / STEPS + 0);
     const text = sticks.join();
     if (text === this.sent) return;
     this.sent = text;
-    player.order('drive', { entities: [this.who], sticks });
+    player.order('drive', { entities: [who], sticks });
   }
 
   /** Deflections ahead, left and up. @param {string[]} channels */
