@@ -77,6 +77,12 @@ class Watched:
         self.tab.evaluate("() => document.activeElement && document.activeElement.blur()")
         self.tab.keyboard.press(key)
 
+    def choose(self, who: int) -> None:
+        """Choose an entity by a click on it."""
+        self.wait(f"player.isDrawn && player.pixelOf({who})")
+        self.tab.mouse.click(*self.tab.evaluate(f"() => player.pixelOf({who})"))
+        self.wait(f"player.chosen === {who}")
+
     def close(self) -> None:
         self.tab.close()
 

@@ -24,18 +24,11 @@ def game(chromium):
 def driver(game):
     live, page, chromium = game
     watched = Watched(chromium, page, {"width": 1100, "height": 760})
-    choose(watched, 1)
+    watched.choose(1)
     watched.wait("!document.querySelector('#drive').hidden")
     yield live, watched
     watched.close()
     assert not watched.trouble, "\n".join(watched.trouble)
-
-
-def choose(watched, who):
-    """Choose an entity by a click on it."""
-    watched.wait(f"player.isDrawn && player.pixelOf({who})")
-    watched.tab.mouse.click(*watched.tab.evaluate(f"() => player.pixelOf({who})"))
-    watched.wait(f"player.chosen === {who}")
 
 
 def sticks(live):
@@ -66,7 +59,7 @@ def test_another_choice_gives_it_back(driver):
     live, watched = driver
     watched.press("j")
     watched.until(lambda: sticks(live) is not None)
-    choose(watched, 2)
+    watched.choose(2)
     watched.until(lambda: sticks(live) is None)
 
 

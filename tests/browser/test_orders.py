@@ -75,10 +75,9 @@ def game(chromium, tmp_path_factory):
 
 
 def choose(watched, who):
-    """Choose an entity by a click on it."""
-    watched.wait(f"player.isDrawn && player.pixelOf({who})")
-    watched.tab.mouse.click(*watched.tab.evaluate(f"() => player.pixelOf({who})"))
-    watched.wait(f"player.chosen === {who} && !document.querySelector('#orders').hidden")
+    """Choose an entity, and wait for its orders."""
+    watched.choose(who)
+    watched.wait("!document.querySelector('#orders').hidden")
 
 
 def step(live, n=1):

@@ -36,6 +36,8 @@ def arrow_array(
     if not isinstance(values, np.ndarray):
         values = np.array([0 if value is None else value for value in values], kind.to_pandas_dtype())
     numbers = np.ascontiguousarray(values, kind.to_pandas_dtype())
+    if numbers.dtype != values.dtype and (numbers != values).any():
+        raise OverflowError(f"there are numbers that do not fit the type {kind}")
     if pa.types.is_boolean(kind):
         numbers = np.packbits(numbers, bitorder="little")
     return pa.Array.from_buffers(kind, len(values), [valid, pa.py_buffer(numbers)])

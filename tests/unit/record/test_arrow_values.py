@@ -41,8 +41,9 @@ def test_masked_values_are_null():
 
 
 def test_numbers_that_do_not_fit_are_refused():
-    with pytest.raises(OverflowError):
-        arrow_array([2**31], pa.int32())
+    for values in ([2**31], np.array([2**31])):
+        with pytest.raises(OverflowError):
+            arrow_array(values, pa.int32())
 
 
 def test_a_recorded_run_does_not_import_pandas(tmp_path):
