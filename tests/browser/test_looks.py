@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import io
 import re
 
+import matplotlib.image
 import pytest
 from contrast import faint_texts
 from recorded_games import hunt, record
 from served import Watched
 
-from tussle import Simulation
+from tussle import Block, Mission, Simulation
 from tussle.batch import Batch, load_batch
 from tussle.batch.report import write_report
-from tussle.stock import FieldOfView
+from tussle.stock import FieldOfView, SimpleCar, SimpleCarControllerHeading, Straight
 from tussle.view import Live, Recording
 from tussle.view.page.server import Page
 
@@ -238,6 +240,53 @@ def test_between_the_states_of_a_live_game_entities_are_on_the_way(game):
     between = [step for step in steps if abs(step - round(step)) > 1e-3]
     assert len(between) > 3, "states are not whole steps only"
     assert seen == sorted(seen), "and the game does not go back"
+
+
+def crowd(n):
+    """Cars of two teams, one in the west and one in the east."""
+    blocks = [
+        Block(
+            name=f"cars_{team}",
+            team=team,
+            count=n // 2,
+            position=(x, 0.0, 0.0),
+            placement="uniform",
+            half_width=(140.0, 100.0, 0.0),
+            scatter_first=True,
+            autonomy=[Straight(speed=0.0)],
+            controller=[SimpleCarControllerHeading()],
+            motion=SimpleCar(),
+        )
+        for team, x in ((1, -160.0), (2, 160.0))
+    ]
+    return Mission(blocks=blocks, dt=0.1, end=1e4)
+
+
+@pytest.mark.parametrize("n", [400, 800])
+def test_entities_of_a_crowd_stand_where_they_are_in_their_colours(chromium, n):
+    """The corners of 800 cars are more than all are drawn for where they are small."""
+    with (
+        Simulation(crowd(n), 1) as simulation,
+        Live(simulation, is_paused=True, pace=1.0) as live,
+        Page(live) as page,
+    ):
+        watched = Watched(chromium, page, {"width": 1100, "height": 700})
+        watched.press("v")
+        watched.wait("player.isDrawn && player.camera.pitch > 1.5")
+        picture = matplotlib.image.imread(io.BytesIO(watched.tab.screenshot()))
+        for who in range(1, n + 1, 17):
+            x, y = watched.tab.evaluate("(id) => player.pixelOf(id)", who)
+            red, _, blue = picture[round(y), round(x), :3]
+            is_left = watched.tab.evaluate("(id) => player.stateOf(id).pos[0]", who) < 0.0
+            assert (blue > red + 0.2) if is_left else (red > blue + 0.2), who
+        widths = "() => ['view', 'over'].map((id) => document.getElementById(id).width)"
+        assert watched.tab.evaluate(widths) == [1100, 1100]
+        live.resume()
+        watched.until(lambda: watched.tab.evaluate(widths) == [550, 1100])
+        live.pause()
+        watched.until(lambda: watched.tab.evaluate(widths) == [1100, 1100])
+        watched.close()
+        assert not watched.trouble
 
 
 @pytest.mark.parametrize("scheme", ["dark", "light"])

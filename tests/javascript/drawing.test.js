@@ -5,7 +5,7 @@ import { test } from 'node:test';
 import { Camera, pixelOf, placeBehind, STEEPEST } from '../../src/tussle/view/page/web/camera.js';
 import { decimalsOf, eventText, length, number, times } from '../../src/tussle/view/page/web/formatting.js';
 import { forward, halfTurn, minus, norm, rotated, turned, unit } from '../../src/tussle/view/page/web/geometry.js';
-import { prepared } from '../../src/tussle/view/page/web/models.js';
+import { coarse, prepared } from '../../src/tussle/view/page/web/models.js';
 import { Reader } from '../../src/tussle/view/page/web/packing.js';
 import { linkOpacity, pairsWithin, sectorMesh } from '../../src/tussle/view/page/web/reach.js';
 
@@ -85,12 +85,32 @@ test('angles and directions', () => {
 test('a box has sharp edges and flat sides, a fine roof round ones', () => {
   const tent = (height) => ({ vertices: [-1, 0, 0, 0, 0, height, 1, 0, 0, 0, 2, height], faces: [0, 1, 3, 1, 2, 3] });
   const [steep, flat] = [prepared(tent(1)), prepared(tent(0.01))];
-  assert.equal(steep.corners.length, 6 * 6);
-  assert.equal(steep.lines.length / 12, 5, 'four sides and the ridge');
-  assert.equal(flat.lines.length / 12, 4, 'the ridge is no edge');
-  const normals = (corners, i) => corners.subarray(6 * i + 3, 6 * i + 6);
+  assert.equal(steep.corners.length, 6 * 8);
+  assert.equal(steep.lines.length / 16, 5, 'four sides and the ridge');
+  assert.equal(flat.lines.length / 16, 4, 'the ridge is no edge');
+  const normals = (corners, i) => corners.subarray(8 * i + 4, 8 * i + 7);
   isNear(normals(flat.corners, 1), normals(flat.corners, 3), 1e-6);
   assert.ok(norm(minus(normals(steep.corners, 1), normals(steep.corners, 3))) > 0.5);
+});
+
+test('a coarse mesh has few faces, and reaches as far', () => {
+  const n = 24;
+  const at = (/** @type {number} */ i, /** @type {number} */ j) => {
+    const [up, round] = [(Math.PI * j) / n, (2 * Math.PI * i) / n];
+    return [2 * Math.sin(up) * Math.cos(round), Math.sin(up) * Math.sin(round), 3 * Math.cos(up)];
+  };
+  const vertices = [];
+  const faces = [];
+  for (let j = 0; j <= n; j++) for (let i = 0; i < n; i++) vertices.push(...at(i, j));
+  for (let j = 0; j < n; j++) for (let i = 0; i < n; i++) {
+    const [a, b] = [n * j + i, n * j + ((i + 1) % n)];
+    faces.push(a, a + n, b, b, a + n, b + n);
+  }
+  const few = coarse({ vertices, faces });
+  assert.ok(few.faces.length < faces.length / 10, `${few.faces.length / 3} faces`);
+  assert.deepEqual(coarse(few).faces.length, few.faces.length, 'what is coarse stays');
+  const reach = (/** @type {number[]} */ corners) => [0, 1, 2].map((k) => Math.max(...corners.map((i) => vertices[3 * i + k])));
+  isNear(reach(few.faces), reach(faces), 0.35);
 });
 
 test('a field of view ends at its angles, and is closed', () => {

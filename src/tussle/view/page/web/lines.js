@@ -4,25 +4,16 @@
 import { minus } from './geometry.js';
 import { Instances, Renderer } from './renderer.js';
 
-/** Of a point of a line: place, age from 0 to 1, colour, and whether a line goes on from it to the next. */
-const POINT_BYTES = 20;
+/** Of a point of a line: place, colour, and in a byte its age from 0 to 127 and whether a line goes on from it to the next. */
+const POINT_BYTES = 16;
 
 /** Points of lines; each goes on to the next one, if it says so. */
 export class Lines extends Instances {
   /** @param {Renderer} renderer */
   constructor(renderer) {
     super(renderer, POINT_BYTES);
-    const { gl } = renderer;
     /** @type {Vector} */
     this.anchor = [0, 0, 0];
-    this.array = renderer.array(() => {
-      gl.bindBuffer(gl.ARRAY_BUFFER, this.buffer);
-      renderer.attribute(0, 3, gl.FLOAT, POINT_BYTES, 0, 1);
-      renderer.attribute(1, 1, gl.FLOAT, POINT_BYTES, 12, 1);
-      renderer.attribute(2, 4, gl.UNSIGNED_BYTE, POINT_BYTES, 16, 1);
-      renderer.attribute(3, 3, gl.FLOAT, POINT_BYTES, POINT_BYTES, 1);
-      renderer.attribute(4, 1, gl.FLOAT, POINT_BYTES, POINT_BYTES + 12, 1);
-    });
   }
 
   /** Start anew, with places relative to an anchor. @param {Vector} anchor */
@@ -31,11 +22,10 @@ export class Lines extends Instances {
     this.n = 0;
   }
 
-  /** @param {Vector} place @param {number} age @param {Colour} colour @param {boolean} goesOn */
+  /** @param {Vector} place @param {number} age from 0 to 1 @param {Colour} colour @param {boolean} goesOn */
   add(place, age, colour, goesOn) {
-    const at = (POINT_BYTES / 4) * this.append(16, colour, goesOn ? 255 : 0);
+    const at = (POINT_BYTES / 4) * this.append(colour, 2 * Math.round(127 * age) + Number(goesOn));
     for (let k = 0; k < 3; k++) this.floats[at + k] = place[k] - this.anchor[k];
-    this.floats[at + 3] = age;
   }
 
   /** @param {Vector} a @param {Vector} b @param {Colour} colour */
@@ -47,12 +37,10 @@ export class Lines extends Instances {
   /** @param {View} view @param {number} width pixels of the screen @param {number} opacity */
   draw(view, width, opacity) {
     if (this.n < 2) return;
-    const { gl } = this.renderer;
     this.renderer.use('line', {
       clip: view.clip, offset: minus(this.anchor, view.anchor), viewport: [view.width, view.height], width: width * view.ratio, near: view.near, opacity,
     });
-    gl.bindVertexArray(this.array);
-    gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, this.n - 1);
+    this.drawVertices(this.renderer.gl.TRIANGLES, 6 * (this.n - 1));
   }
 }
 

@@ -1,20 +1,25 @@
 // Models: one mesh drawn at many places at once.
 /** @import { Colour, Mesh, PageData, Vector, View } from './types' */
 
-import { add, cross, dot, minus, unit } from './geometry.js';
-import { Instances, Renderer } from './renderer.js';
+import { add, cross, dot, minus, norm, scaled, unit } from './geometry.js';
+import { Instances, Renderer, Table, wordsFor } from './renderer.js';
 import { Layer } from './layer.js';
 
 /** Angle between faces below which an edge looks round. */
 const ROUND = Math.cos((40 * Math.PI) / 180);
 /** Angle above which an edge is drawn in the wireframe. */
 const SHARP = Math.cos((8 * Math.PI) / 180);
-/** Of an instance: place, attitude, colour and lengths along its axes. */
-const INSTANCE_BYTES = 44;
+/** Of an instance: place and colour, attitude, lengths along its axes. */
+const INSTANCE_BYTES = 48;
+/** Cells along each axis in which the corners of a coarse mesh are put together. */
+const CELLS = 3;
+/** Where all meshes together have more corners, entities that are shown smaller than so many pixels have coarse ones. */
+const MAX_CORNERS = 3e5;
+const SMALL = 24;
 /** Quaternion of a body that is level and heads east. */
 export const LEVEL = [1, 0, 0, 0];
 
-/** Corners with normals, round or sharp by the angle of their edges, and the ends of sharp edges. @param {Mesh} mesh */
+/** Corners with normals, round or sharp by the angle of their edges, and the ends of sharp edges: eight numbers each. @param {Mesh} mesh */
 export function prepared({ vertices, faces }) {
   const place = (/** @type {number} */ corner) => vertices.slice(3 * corner, 3 * corner + 3);
   /** Place -> normals of the faces around it. @type {Map<string, number[][]>} */
@@ -34,10 +39,37 @@ export function prepared({ vertices, faces }) {
   const corners = triangles.flatMap((triangle, f) => triangle.flatMap((here) => {
     const own = unit(normals[f]);
     const alike = around.get(`${here}`).filter((other) => dot(unit(other), own) > ROUND);
-    return [...here, ...unit(alike.reduce(add, [0, 0, 0]))];
+    return [...here, 0, ...unit(alike.reduce(add, [0, 0, 0])), 0];
   }));
   const sharp = [...edges.values()].filter(({ normals: [a, b, ...more] }) => !b || more.length || dot(a, b) < SHARP);
-  return { corners: new Float32Array(corners), lines: new Float32Array(sharp.flatMap(({ ends }) => ends.flatMap((end) => [...end, 0, 0, 1]))) };
+  return { corners: new Float32Array(corners), lines: new Float32Array(sharp.flatMap(({ ends }) => ends.flatMap((end) => [...end, 0, 0, 0, 1, 0]))) };
+}
+
+/** A mesh of few faces: all corners in a cell become the one of them that is farthest from the middle. @param {Mesh} mesh @returns {Mesh} */
+export function coarse({ vertices, faces }) {
+  const n = vertices.length / 3;
+  const [low, high] = [Math.min, Math.max].map((least) => [0, 1, 2].map((k) => {
+    let found = vertices[k];
+    for (let i = 1; i < n; i++) found = least(found, vertices[3 * i + k]);
+    return found;
+  }));
+  const place = (/** @type {number} */ i) => vertices.slice(3 * i, 3 * i + 3);
+  const far = (/** @type {number} */ i) => norm(minus(scaled(place(i), 2), add(low, high)));
+  /** Cell of each corner, and the corner that stands for a cell. @type {number[]} */
+  const cells = [];
+  /** @type {number[]} */
+  const best = [];
+  for (let i = 0; i < n; i++) {
+    cells[i] = place(i).reduce((cell, c, k) => CELLS * cell + Math.min(CELLS - 1, Math.floor((CELLS * (c - low[k])) / (high[k] - low[k] || 1))), 0);
+    if (best[cells[i]] === undefined || far(i) > far(best[cells[i]])) best[cells[i]] = i;
+  }
+  /** Both sides of what is thin become one. @type {Map<string, number[]>} */
+  const kept = new Map();
+  for (let f = 0; f < faces.length; f += 3) {
+    const face = [0, 1, 2].map((k) => best[cells[faces[f + k]]]);
+    if (new Set(face).size === 3) kept.set(`${[...face].sort()}`, face);
+  }
+  return { vertices, faces: [...kept.values()].flat() };
 }
 
 /** One mesh and the instances of it that are drawn. */
@@ -50,19 +82,13 @@ export class Model extends Instances {
     this.wire = this.shape(lines);
   }
 
-  /** @param {Float32Array<ArrayBuffer>} corners place and normal of each */
+  /** @param {Float32Array} corners place and normal of each, eight numbers */
   shape(corners) {
-    const { renderer } = this;
-    const { gl } = renderer;
-    const array = renderer.array(() => {
-      renderer.corners(corners);
-      gl.bindBuffer(gl.ARRAY_BUFFER, this.buffer);
-      renderer.attribute(2, 3, gl.FLOAT, INSTANCE_BYTES, 0, 1);
-      renderer.attribute(3, 4, gl.FLOAT, INSTANCE_BYTES, 12, 1);
-      renderer.attribute(4, 4, gl.UNSIGNED_BYTE, INSTANCE_BYTES, 28, 1);
-      renderer.attribute(5, 3, gl.FLOAT, INSTANCE_BYTES, 32, 1);
-    });
-    return { array, n: corners.length / 6 };
+    const words = new Uint32Array(wordsFor(corners.length));
+    new Float32Array(words.buffer).set(corners);
+    const table = new Table(this.renderer);
+    table.upload(words);
+    return { table, n: corners.length / 8 };
   }
 
   /**
@@ -71,11 +97,11 @@ export class Model extends Instances {
    * @param {Colour} colour @param {number | Vector} size one length [m] or three @param {number} mark 255 for the chosen entity
    */
   add(x, y, z, quat, at, colour, size, mark = 0) {
-    const f = (INSTANCE_BYTES / 4) * this.append(28, colour, mark);
+    const f = (INSTANCE_BYTES / 4) * this.append(colour, mark);
     this.floats[f] = x;
     this.floats[f + 1] = y;
     this.floats[f + 2] = z;
-    for (let k = 0; k < 4; k++) this.floats[f + 3 + k] = quat[at + k];
+    for (let k = 0; k < 4; k++) this.floats[f + 4 + k] = quat[at + k];
     for (let k = 0; k < 3; k++) this.floats[f + 8 + k] = typeof size === 'number' ? size : size[k];
   }
 
@@ -83,10 +109,12 @@ export class Model extends Instances {
   draw(view, { scale = 1, least = 0, opacity = 1, flatness = 0, bright = 1 }, isWire = false) {
     if (!this.n) return;
     const { gl } = this.renderer;
-    const { array, n } = isWire ? this.wire : this.solid;
-    this.renderer.use('model', { clip: view.clip, scale, least: least * view.ratio * view.perPixel, opacity, flatness: isWire ? 1 : flatness, bright });
-    gl.bindVertexArray(array);
-    gl.drawArraysInstanced(isWire ? gl.LINES : gl.TRIANGLES, 0, n, this.n);
+    const { table, n } = isWire ? this.wire : this.solid;
+    this.renderer.use('model', { corners: n, clip: view.clip, scale, least: least * view.ratio * view.perPixel, opacity, flatness: isWire ? 1 : flatness, bright });
+    gl.activeTexture(gl.TEXTURE1);
+    gl.bindTexture(gl.TEXTURE_2D, table.texture);
+    gl.activeTexture(gl.TEXTURE0);
+    this.drawVertices(isWire ? gl.LINES : gl.TRIANGLES, n * this.n);
   }
 
   /** Draw it once at a place. @param {View} view @param {Vector} place @param {Colour} colour @param {number | Vector} size @param {Record<string, number>} look */
@@ -104,22 +132,30 @@ export class Entities {
   /** @param {Renderer} renderer @param {Layer} layer @param {PageData} page */
   constructor(renderer, layer, { blocks, models }) {
     this.layer = layer;
-    const found = new Map(blocks.map(({ model }) => [model, new Model(renderer, models[model])]));
-    this.models = [...found.values()];
-    this.modelOf = blocks.map(({ model }) => found.get(model));
+    const found = new Map(blocks.map(({ model }) => [model, [models[model], coarse(models[model])].map((mesh) => new Model(renderer, mesh))]));
+    this.models = [...found.values()].flat();
+    /** Of each block, the models for what is near and what is far. */
+    this.modelsOf = blocks.map(({ model }) => found.get(model));
     this.sizeOf = blocks.map(({ lengths }) => lengths);
   }
 
-  /** Place all that are shown. @param {Vector} anchor @param {Set<number>} hidden teams @param {number} chosen */
-  place(anchor, hidden, chosen) {
+  /** Place all that are shown. @param {View} view @param {number} scale @param {Set<number>} hidden teams @param {number} chosen */
+  place(view, scale, hidden, chosen) {
     const { shown } = this.layer;
+    const { anchor, eye, away } = view;
     for (const model of this.models) model.n = 0;
+    let nCorners = 0;
+    for (let i = 0; i < shown.n; i++) nCorners += this.modelsOf[shown.block[i]][0].solid.n;
+    /** Distance from the eye at which they are small. */
+    const farFrom = this.sizeOf.map((lengths) => (nCorners > MAX_CORNERS ? (scale * Math.max(...lengths)) / (SMALL * view.ratio * view.perPixel) : Infinity));
     for (let i = 0; i < shown.n; i++) {
       if (hidden.has(shown.team[i])) continue;
       const block = shown.block[i];
-      const mark = shown.id[i] === chosen ? 255 : 0;
+      const isChosen = shown.id[i] === chosen;
+      const isFar = (eye[0] - shown.x[i]) * away[0] + (eye[1] - shown.y[i]) * away[1] + (eye[2] - shown.z[i]) * away[2] > farFrom[block];
+      const model = this.modelsOf[block][Number(isFar && !isChosen)];
       const [x, y, z] = [shown.x[i] - anchor[0], shown.y[i] - anchor[1], shown.z[i] - anchor[2]];
-      this.modelOf[block].add(x, y, z, shown.quat, 4 * i, this.layer.colourOf(i), this.sizeOf[block], mark);
+      model.add(x, y, z, shown.quat, 4 * i, this.layer.colourOf(i), this.sizeOf[block], isChosen ? 255 : 0);
     }
     for (const model of this.models) model.upload();
   }

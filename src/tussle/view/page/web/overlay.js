@@ -25,10 +25,12 @@ export class Overlay {
     this.paper = '';
   }
 
-  /** Empty it. @param {View} view */
-  begin({ width, height, ratio }) {
+  /** Empty it. @param {View} view @param {number} fineness its pixels in one of the view */
+  begin({ width, height, ratio }, fineness) {
     const { canvas } = this;
-    if (canvas.width !== width || canvas.height !== height) [canvas.width, canvas.height] = [width, height];
+    const size = [fineness * width, fineness * height];
+    if (canvas.width !== size[0] || canvas.height !== size[1]) [canvas.width, canvas.height] = size;
+    this.pen.setTransform(fineness, 0, 0, fineness, 0, 0);
     this.pen.clearRect(0, 0, width, height);
     this.ratio = ratio;
     this.taken = [];

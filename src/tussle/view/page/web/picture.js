@@ -31,15 +31,17 @@ export class Picture {
     this.reach = new Reach(renderer, layer);
     this.overlay = new Overlay(byId('over', HTMLCanvasElement));
     this.ratio = 1;
+    this.isHalf = false;
     /** @type {View | null} */
     this.view = null;
     this.setTheme(page.scenery.background ? 'mission' : window.matchMedia('(prefers-color-scheme: light)').matches ? 'light' : 'dark');
   }
 
-  /** Fit it to the window. */
-  resize() {
+  /** Fit it to the window. @param {boolean} isHalf half as many pixels each way, where they are slow */
+  resize(isHalf = this.isHalf) {
     const { canvas } = this.player;
-    this.ratio = Math.min(window.devicePixelRatio || 1, 2);
+    this.isHalf = isHalf;
+    this.ratio = Math.min(window.devicePixelRatio || 1, 2) * (isHalf ? 0.5 : 1);
     canvas.width = Math.max(1, Math.round(canvas.clientWidth * this.ratio));
     canvas.height = Math.max(1, Math.round(canvas.clientHeight * this.ratio));
   }
@@ -125,7 +127,7 @@ export class Picture {
     gl.disable(gl.BLEND);
     scenery.drawSky(this.colours);
     scenery.drawTerrain(view, this.look, drawn.grid);
-    this.entities.place(anchor, hidden, chosen);
+    this.entities.place(view, this.scale, hidden, chosen);
     this.entities.draw(view, { scale: this.scale, least: drawn.least ? MIN_SIZE : 0, bright: this.look.bright }, drawn.wire);
     if (drawn.shapes) {
       this.shapes.place(anchor);
@@ -155,7 +157,7 @@ export class Picture {
     const { overlay, scenery } = this;
     const { layer, drawn, clock, chosen, hovered } = this.player;
     const size = 12 * 1.15 ** drawn.text;
-    overlay.begin(view);
+    overlay.begin(view, this.isHalf ? 2 : 1);
     overlay.flashes(view, layer, clock.t, between(FLASH * clock.speed, 0.2, 20));
     const slot = chosen ? layer.slotOf(chosen) : -1;
     const pixel = slot >= 0 ? pixelOf(view, layer.placeIn(slot)) : null;
@@ -174,6 +176,7 @@ export class Picture {
   /** Hand the picture, without the panels, to the reader as a PNG file. */
   save() {
     const { canvas, page, clock } = this.player;
+    this.resize(false);
     const picture = element('canvas');
     [picture.width, picture.height] = [canvas.width, canvas.height];
     const pen = picture.getContext('2d');

@@ -7,6 +7,7 @@ import { Recorded } from './recorded.js';
 import { Live } from './live.js';
 import { Camera, STEEPEST } from './camera.js';
 import { Picture } from './picture.js';
+import { isDrawnSlowly } from './renderer.js';
 import { TRAIL_LENGTHS, TRAIL_OF_CHOSEN } from './trails.js';
 import { EventLine } from './events.js';
 import { LiveClock, RecordedClock } from './timeline.js';
@@ -36,7 +37,10 @@ export class Player {
     this.source = source;
     this.sorry = sorry;
     this.canvas = byId('view', HTMLCanvasElement);
-    this.gl = this.canvas.getContext('webgl2', { antialias: true, alpha: false, powerPreference: 'high-performance' });
+    /** It is drawn without a graphics card. */
+    this.isSlow = isDrawnSlowly();
+    document.body.dataset.drawn = this.isSlow ? 'slowly' : '';
+    this.gl = this.canvas.getContext('webgl2', { antialias: !this.isSlow, alpha: false, powerPreference: 'high-performance' });
     if (!this.gl) throw new Sorry('This page draws with WebGL 2, which this browser does not have or has turned off.');
     if (!window.DecompressionStream) throw new Sorry('This page unpacks its data with DecompressionStream, which this browser is too old to have.');
     const size = Math.max(norm(minus(page.scenery.high, page.scenery.low)), 1);
@@ -98,7 +102,8 @@ export class Player {
     this.viewpoint.open();
     this.lookBack();
     this.isReady = true;
-    if (window.matchMedia('(hover: hover)').matches) this.say('h shows the keys');
+    const hints = [this.isSlow && 'Drawn without a graphics card: coarser while it moves', window.matchMedia('(hover: hover)').matches && 'h shows the keys'];
+    this.say(hints.filter(Boolean).join(' · '));
     this.last = performance.now();
     requestAnimationFrame((now) => this.tick(now));
   }
@@ -199,6 +204,12 @@ export class Player {
     this.look();
   }
 
+  /** Draw with half the pixels each way, or with all again. @param {boolean} isHalf */
+  refine(isHalf) {
+    this.picture.resize(isHalf);
+    this.look();
+  }
+
   /** Draw again. */
   look() {
     this.isChanged = true;
@@ -219,6 +230,8 @@ export class Player {
     if (this.isShown) {
       this.viewpoint.update();
       const isMoving = this.camera.step(seconds, this.isCalm);
+      const isHalf = this.isSlow && (isMoving || this.clock.isPlaying);
+      if (isHalf !== this.picture.isHalf) this.refine(isHalf);
       if (this.isChanged || isMoving) {
         this.isChanged = isMoving;
         this.draw();

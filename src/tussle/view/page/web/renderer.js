@@ -11,6 +11,21 @@ const PROGRAMS = {
   terrain: [TERRAIN_CORNERS, TERRAIN_PAINT], part: [PART_CORNERS, PART_PAINT], sky: [SKY_CORNERS, SKY_PAINT],
 };
 
+/** Texels of a row of a table; programs know it too. */
+const TABLE_WIDTH = 1024;
+
+/** What draws WebGL without a graphics card calls itself so. */
+const SOFTWARE = /swiftshader|llvmpipe|softpipe|software|basic render/i;
+
+/** Whether this browser draws without a graphics card. */
+export function isDrawnSlowly() {
+  const gl = document.createElement('canvas').getContext('webgl2');
+  const names = gl?.getExtension('WEBGL_debug_renderer_info');
+  const isSlow = SOFTWARE.test(String(gl?.getParameter(names ? names.UNMASKED_RENDERER_WEBGL : gl.RENDERER)));
+  gl?.getExtension('WEBGL_lose_context')?.loseContext();
+  return isSlow;
+}
+
 /** The canvas with its programs. */
 export class Renderer {
   /** @param {WebGL2RenderingContext} gl */
@@ -38,10 +53,12 @@ export class Renderer {
     if (!gl.getProgramParameter(made, gl.LINK_STATUS) && !gl.isContextLost()) throw new Error(gl.getProgramInfoLog(made));
     /** @type {Record<string, WebGLUniformLocation>} */
     const places = {};
+    gl.useProgram(made);
     for (let i = 0; i < gl.getProgramParameter(made, gl.ACTIVE_UNIFORMS); i++) {
       const { name } = gl.getActiveUniform(made, i);
       places[name] = gl.getUniformLocation(made, name);
     }
+    gl.uniform1i(places.mesh ?? null, 1);
     return { made, places };
   }
 
@@ -74,11 +91,9 @@ export class Renderer {
   }
 
   /** Tell where an attribute lies in the bound buffer. @param {number} place @param {number} size @param {number} kind @param {number} stride @param {number} offset */
-  attribute(place, size, kind, stride, offset, divisor = 0) {
-    const { gl } = this;
-    gl.enableVertexAttribArray(place);
-    gl.vertexAttribPointer(place, size, kind, kind === gl.UNSIGNED_BYTE, stride, offset);
-    gl.vertexAttribDivisor(place, divisor);
+  attribute(place, size, kind, stride, offset) {
+    this.gl.enableVertexAttribArray(place);
+    this.gl.vertexAttribPointer(place, size, kind, false, stride, offset);
   }
 
   /** Corners with place and normal: see `shape` of models. @param {Float32Array<ArrayBuffer>} corners */
@@ -107,13 +122,41 @@ export class Renderer {
   }
 }
 
+/** Numbers that programs find by the number of a vertex: without a graphics card, an instance takes far longer to draw than its vertices. */
+export class Table {
+  /** @param {Renderer} renderer */
+  constructor(renderer) {
+    this.gl = renderer.gl;
+    this.texture = this.gl.createTexture();
+    this.nRows = 0;
+  }
+
+  /** @param {Uint32Array<ArrayBuffer>} words four a texel, full rows of texels @param {number} n texels that count */
+  upload(words, n = words.length / 4) {
+    const { gl } = this;
+    const nRows = words.length / (4 * TABLE_WIDTH);
+    gl.bindTexture(gl.TEXTURE_2D, this.texture);
+    if (nRows !== this.nRows) {
+      gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA32UI, TABLE_WIDTH, nRows, 0, gl.RGBA_INTEGER, gl.UNSIGNED_INT, words);
+      for (const filter of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) gl.texParameteri(gl.TEXTURE_2D, filter, gl.NEAREST);
+    } else if (n > 0) {
+      const size = [Math.min(n, TABLE_WIDTH), Math.ceil(n / TABLE_WIDTH)];
+      gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, size[0], size[1], gl.RGBA_INTEGER, gl.UNSIGNED_INT, words);
+    }
+    this.nRows = nRows;
+  }
+}
+
+/** Words of full rows of a table that have room for so many. @param {number} n */
+export const wordsFor = (n) => 4 * TABLE_WIDTH * Math.max(1, Math.ceil(n / (4 * TABLE_WIDTH)));
+
 /** Rows of numbers that are filled anew for each picture. */
 export class Instances {
-  /** @param {Renderer} renderer @param {number} rowBytes */
+  /** @param {Renderer} renderer @param {number} rowBytes a multiple of 16 */
   constructor(renderer, rowBytes) {
     this.renderer = renderer;
     this.rowBytes = rowBytes;
-    this.buffer = renderer.gl.createBuffer();
+    this.table = new Table(renderer);
     this.n = 0;
     this.resize(64);
   }
@@ -121,17 +164,17 @@ export class Instances {
   /** @param {number} room */
   resize(room) {
     const old = this.bytes;
-    this.room = room;
-    this.bytes = new Uint8Array(this.rowBytes * room);
-    this.floats = new Float32Array(this.bytes.buffer);
+    this.words = new Uint32Array(wordsFor((room * this.rowBytes) / 4));
+    this.bytes = new Uint8Array(this.words.buffer);
+    this.floats = new Float32Array(this.words.buffer);
+    this.room = Math.floor(this.bytes.length / this.rowBytes);
     if (old) this.bytes.set(old);
-    this.isRoomNew = true;
   }
 
-  /** Append a row of numbers and a colour with a fourth value, 0 to 255; its number. @param {number} colourByte where the colour is in the row @param {Vector} colour @param {number} fourth */
-  append(colourByte, colour, fourth) {
+  /** Append a row of a place, a colour with a fourth value, 0 to 255, and more; its number. @param {Vector} colour @param {number} fourth */
+  append(colour, fourth) {
     if (this.n >= this.room) this.resize(2 * this.room);
-    const at = this.rowBytes * this.n + colourByte;
+    const at = this.rowBytes * this.n + 12;
     for (let k = 0; k < 3; k++) this.bytes[at + k] = colour[k];
     this.bytes[at + 3] = fourth;
     return this.n++;
@@ -139,10 +182,14 @@ export class Instances {
 
   /** Hand the rows to the graphics card. */
   upload() {
+    this.table.upload(this.words, (this.n * this.rowBytes) / 16);
+  }
+
+  /** Draw so many vertices. @param {number} kind @param {number} n */
+  drawVertices(kind, n) {
     const { gl } = this.renderer;
-    gl.bindBuffer(gl.ARRAY_BUFFER, this.buffer);
-    if (this.isRoomNew) gl.bufferData(gl.ARRAY_BUFFER, this.bytes.byteLength, gl.DYNAMIC_DRAW);
-    this.isRoomNew = false;
-    gl.bufferSubData(gl.ARRAY_BUFFER, 0, this.bytes, 0, this.rowBytes * this.n);
+    gl.bindTexture(gl.TEXTURE_2D, this.table.texture);
+    gl.bindVertexArray(null);
+    gl.drawArrays(kind, 0, n);
   }
 }

@@ -10,29 +10,44 @@ vec3 lit(vec3 colour, vec3 normal) {
   return colour * (0.42 + 0.25 * sky + 0.5 * sun);
 }`;
 
+/** Numbers of the tables of the renderer. */
+const TABLES = `
+uniform highp usampler2D rows;
+uvec4 texel(highp usampler2D table, int i) {
+  return texelFetch(table, ivec2(i & 1023, i >> 10), 0);
+}
+vec4 numbers(highp usampler2D table, int i) {
+  return uintBitsToFloat(texel(table, i));
+}
+vec4 bytes(uint word) {
+  return vec4(uvec4(word, word >> 8, word >> 16, word >> 24) & 255u);
+}`;
+
 /** Models: one mesh at many places. Colours have the share of white that marks who is chosen in place of opacity. */
 export const MODEL_CORNERS = `${HEADER}
-layout(location = 0) in vec3 corner;
-layout(location = 1) in vec3 normal;
-layout(location = 2) in vec3 place;
-layout(location = 3) in vec4 attitude;
-layout(location = 4) in vec4 colour;
-layout(location = 5) in vec3 size;
+${TABLES}
+uniform highp usampler2D mesh;
+uniform float corners;
 uniform mat4 clip;
 uniform float scale;
 uniform float least;
 out vec3 towards;
 out vec4 paint;
-vec3 turned(vec3 v) {
+vec3 turned(vec4 attitude, vec3 v) {
   return v + 2.0 * cross(attitude.yzw, cross(attitude.yzw, v) + attitude.x * v);
 }
 void main() {
+  int instance = gl_VertexID / int(corners);
+  int at = 2 * (gl_VertexID - instance * int(corners));
+  uvec4 first = texel(rows, 3 * instance);
+  vec3 place = uintBitsToFloat(first.xyz);
+  vec4 attitude = numbers(rows, 3 * instance + 1);
   float depth = (clip * vec4(place, 1.0)).w;
-  vec3 grown = scale * size;
+  vec3 grown = scale * numbers(rows, 3 * instance + 2).xyz;
   grown *= max(1.0, least * depth / max(1e-9, max(grown.x, max(grown.y, grown.z))));
-  gl_Position = clip * vec4(place + turned(grown * corner), 1.0);
-  towards = turned(normal / grown);
-  paint = colour;
+  gl_Position = clip * vec4(place + turned(attitude, grown * numbers(mesh, at).xyz), 1.0);
+  towards = turned(attitude, numbers(mesh, at + 1).xyz / grown);
+  paint = bytes(first.w) / 255.0;
 }`;
 export const MODEL_PAINT = `${HEADER}
 in vec3 towards;
@@ -48,13 +63,9 @@ void main() {
   result = vec4(min(bright * mix(lit(colour, normal), colour, flatness), 1.0), 1.0) * opacity;
 }`;
 
-/** Lines of a width in pixels: each instance goes from a point to the next one, if that is joined to it (its opacity). */
+/** Lines of a width in pixels: six vertices go from a point to the next one, if that is joined to it. */
 export const LINE_CORNERS = `${HEADER}
-layout(location = 0) in vec3 start;
-layout(location = 1) in float startAge;
-layout(location = 2) in vec4 colour;
-layout(location = 3) in vec3 end;
-layout(location = 4) in float endAge;
+${TABLES}
 uniform mat4 clip;
 uniform vec3 offset;
 uniform vec2 viewport;
@@ -64,25 +75,30 @@ out vec4 paint;
 out float age;
 out float side;
 void main() {
-  vec4 a = clip * vec4(start + offset, 1.0);
-  vec4 b = clip * vec4(end + offset, 1.0);
-  if (colour.a == 0.0 || (a.w < near && b.w < near)) {
+  int point = gl_VertexID / 6;
+  int corner = gl_VertexID - 6 * point;
+  corner = corner < 3 ? corner : corner < 5 ? 5 - corner : 3;
+  uvec4 start = texel(rows, point);
+  uvec4 end = texel(rows, point + 1);
+  vec4 a = clip * vec4(uintBitsToFloat(start.xyz) + offset, 1.0);
+  vec4 b = clip * vec4(uintBitsToFloat(end.xyz) + offset, 1.0);
+  if ((start.w & (1u << 24)) == 0u || (a.w < near && b.w < near)) {
     gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
     return;
   }
-  vec2 ages = vec2(startAge, endAge);
+  vec2 ages = vec2(start.w >> 25, end.w >> 25) / 127.0;
   if (a.w < near) a = mix(a, b, (near - a.w) / (b.w - a.w));
   if (b.w < near) b = mix(b, a, (near - b.w) / (a.w - b.w));
   vec2 way = (b.xy / b.w - a.xy / a.w) * viewport;
   vec2 along = length(way) > 1e-6 ? normalize(way) : vec2(1.0, 0.0);
-  bool isEnd = gl_VertexID > 1;
-  side = (gl_VertexID & 1) == 1 ? 1.0 : -1.0;
+  bool isEnd = corner > 1;
+  side = (corner & 1) == 1 ? 1.0 : -1.0;
   vec4 at = isEnd ? b : a;
   // One pixel more than asked for on each side, over which the line fades: that is its smooth edge.
   at.xy += vec2(-along.y, along.x) * side * (width + 2.0) / viewport * at.w;
   gl_Position = at;
   age = isEnd ? ages.y : ages.x;
-  paint = colour;
+  paint = bytes(start.w) / 255.0;
 }`;
 export const LINE_PAINT = `${HEADER}
 in vec4 paint;
