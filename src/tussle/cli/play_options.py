@@ -230,6 +230,13 @@ class ViewOptions(AgainOptions, PageOptions):
     roles: Annotated[
         bool, flag("--roles", "Print further addresses: for watching only, and for orders to one team.")
     ] = False
+    link: Annotated[
+        str | None,
+        option(
+            "delay=S,loss=P,bandwidth=B",
+            "Let orders come later [s], be lost with a probability, or share a bandwidth [bytes/s].",
+        ),
+    ] = None
     exit_when_over: Annotated[bool, flag("--exit-when-over", "End with the game, not only by Ctrl-C.")] = (
         False
     )

@@ -14,6 +14,7 @@ from tussle.cli.progress import compiling
 from tussle.cli.summary import Speed, show_summary
 from tussle.cli.terminal import OK, TERMINATED, err, out, say, say_error, say_note
 from tussle.pacing import POLL_PERIOD
+from tussle.view.link import OperatorLink
 from tussle.view.live import Live
 from tussle.view.page.compare import Comparison
 from tussle.view.page.server import Page
@@ -31,6 +32,7 @@ def view(options: ViewOptions) -> int:
     """
     began = time.perf_counter()
     planned = None if options.from_batch is None else planned_by(options)
+    link = None if options.link is None else OperatorLink.of_text(options.link)
     loaded, mission, seed = (
         options.read() if planned is None else (planned.loaded, planned.mission, planned.seed)
     )
@@ -59,6 +61,7 @@ def view(options: ViewOptions) -> int:
             viewer=viewer,
             is_paused=options.paused or bool(viewer.get("start_paused", False)),
             inputs=() if planned is None else planned.inputs,
+            link=link,
         )
         stack.callback(live.stop)
         page = stack.enter_context(Page(live, host=options.host, port=options.port, has_roles=options.roles))

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from tussle.view.frame import Event, Frame, frame_of
+    from tussle.view.link import OperatorLink
     from tussle.view.live import Live
     from tussle.view.recording import Recording
     from tussle.view.scenery import Scenery, scenery_of
@@ -20,6 +21,7 @@ __all__ = [
     "Frame",
     "Live",
     "Mesh",
+    "OperatorLink",
     "Recording",
     "Scenery",
     "Style",
@@ -32,6 +34,7 @@ _LAZY = {
     "Frame": "frame",
     "Event": "frame",
     "Live": "live",
+    "OperatorLink": "link",
     "Style": "style",
     "Mesh": "shapes",
     "Recording": "recording",

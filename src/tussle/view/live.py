@@ -24,6 +24,7 @@ from tussle.view.entity import EntityState, entity_state
 from tussle.view.feed import MessageFeed, TopicTraffic
 from tussle.view.frame import Event, Frame, FrameReader
 from tussle.view.latest import LINGER, LatestValue
+from tussle.view.link import OperatorLink
 from tussle.view.orders import fields_from
 from tussle.view.pacing import checked_warp, faster, slower
 from tussle.view.playback import Order, PlaybackController
@@ -67,6 +68,7 @@ class Live:
         viewer: Viewer tags of the mission file, see `tussle.mission.Loaded`.
         inputs: What came from outside in a recorded run of the game, see `tussle.record.load_inputs`; it comes again, until a message
             or a reset takes the game on another course.
+        link: Over which messages, orders, sticks and settings come to the game; by default they come before the next step.
 
     Raises:
         ParameterError: A value is not allowed.
@@ -85,6 +87,7 @@ class Live:
         memory: float = 256.0,
         viewer: Mapping[str, Any] | None = None,
         inputs: Sequence[ExternalInput] = (),
+        link: OperatorLink | None = None,
     ) -> None:
         check_argument("snapshot_every", snapshot_every, POSITIVE)
         check_argument("memory", memory, POSITIVE)
@@ -96,7 +99,7 @@ class Live:
         self._clock = simulation.state.context.clock
         self._collector = DrawCollector(simulation, world)
         self._pace = Pace(checked_warp(pace))
-        self._player = Player(simulation, world, snapshot_every, 1e6 * memory, inputs)
+        self._player = Player(simulation, world, snapshot_every, 1e6 * memory, inputs, link)
         self._playback = PlaybackController(self._player, self._pace, self._collector, is_paused, self._renew)
         ring = self._playback.ring
         self._frame: LatestValue[Frame] = LatestValue(
@@ -120,6 +123,11 @@ class Live:
         self._playback.give(Order(do, is_seek, may_cut_in))
         if self._thread is None and not self._is_followed:
             self._playback.drain()
+
+    def _send(self, order: Any, do: Callable[[], None], is_sure: bool = False) -> None:
+        """Give an order that goes over the link, see `Player.send`."""
+        self._check_is_own()
+        self._give(lambda: self._player.send(order, do, is_sure))
 
     def _check_is_own(self) -> None:
         if self._is_followed:
@@ -192,9 +200,9 @@ class Live:
         **fields: Any,
     ) -> None:
         """Publish a message to the plugins before the next step and its replays, as `Simulation.publish`. Errors appear in `notes`."""
-        self._check_is_own()
         ids = tuple(map(int, receivers))
-        self._give(lambda: self._playback.say(type_, network, topic, fields, ids))
+        order = [type_.__name__, network, topic, ids, fields]
+        self._send(order, lambda: self._player.publish(type_, network, topic, fields, ids))
 
     def order(self, receivers: Iterable[int], network: str, topic: str, values: Mapping[str, Any]) -> None:
         """Publish a message that a user has typed to some entities, see `tussle.view.orders`. Errors of the game appear in `notes`.
@@ -220,9 +228,8 @@ class Live:
             path: Plugin and parameter, "GoTo.speed".
             value: The value, or those of its components.
         """
-        self._check_is_own()
         ids = tuple(map(int, entities))
-        self._give(lambda: self._playback.set_parameter(path, value, ids))
+        self._send([path, value, ids], lambda: self._player.set_parameter(path, value, ids))
 
     def drive(self, who: int, sticks: Sequence[float] | None) -> None:
         """Drive an entity in place of its autonomies from the next step on, see `tussle.engine.manual`. Errors appear in `notes`.
@@ -231,9 +238,9 @@ class Live:
             who: Its id.
             sticks: Deflections ahead, left and up, from -1 to 1; None gives it back to its autonomies.
         """
-        self._check_is_own()
         player = self._player
-        self._give((lambda: player.release(who)) if sticks is None else (lambda: player.drive(who, sticks)))
+        do = (lambda: player.release(who)) if sticks is None else (lambda: player.drive(who, sticks))
+        self._send([who, sticks], do, is_sure=sticks is None)
 
     def remove(self, entities: Iterable[int]) -> None:
         """Remove entities at the end of the next step."""
@@ -250,9 +257,8 @@ class Live:
         Raises:
             ParameterError: The position is not three finite numbers.
         """
-        self._check_is_own()
         pos = _checked_point("position", position)
-        self._give(lambda: self._playback.spawn(block, pos))
+        self._send([block, pos], lambda: self._player.spawn(block, pos))
 
     def publish_click(self, point: Any) -> None:
         """Publish `WorldPointClicked` with a point [m], (3,), on the network that reaches everyone.

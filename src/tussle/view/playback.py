@@ -8,11 +8,7 @@ from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import Any
 
-import numpy as np
-
-from tussle.declare.messages import Message
 from tussle.errors import PluginError, TussleError
 from tussle.pacing import Pace
 from tussle.view.drawn import DrawCollector
@@ -258,17 +254,3 @@ class PlaybackController:
         self.player.reset(seed)
         self.pace.restart()
         self.speed.restart()
-
-    def say(
-        self, type_: type[Message], network: str, topic: str, fields: dict[str, Any], to: tuple[int, ...]
-    ) -> None:
-        """Publish a message to the plugins."""
-        self.player.publish(type_, network, topic, fields, to)
-
-    def set_parameter(self, path: str, value: Any, to: tuple[int, ...]) -> None:
-        """Set a parameter of some entities."""
-        self.player.set_parameter(path, value, to)
-
-    def spawn(self, block: str, pos: np.ndarray) -> None:
-        """Ask for an entity of a block."""
-        self.player.spawn(block, pos)

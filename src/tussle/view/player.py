@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -13,10 +13,11 @@ from tussle.declare.messages import ManualControl, Message, Messages, SpawnEntit
 from tussle.engine.delivery import check_order
 from tussle.engine.manual import axes_of
 from tussle.engine.simulation import Simulation
-from tussle.errors import ParameterError
+from tussle.errors import ParameterError, PluginError, TussleError
 from tussle.record import Events
 from tussle.view.curves import GameCurves
 from tussle.view.frame import Event, frame_of
+from tussle.view.link import OperatorLink, Underway
 from tussle.view.orders import birth_fields, setting_inputs
 from tussle.view.timeline import History, Timeline
 
@@ -81,6 +82,7 @@ class Player:
         every: Least simulated time between snapshots [s].
         limit: Memory for snapshots and for frames [B], half of it for each.
         inputs: What came from outside in a recorded run of the game; it comes again until a message takes the game on another course.
+        link: Between the people who give orders and the game; by default they come at once.
 
     Attributes:
         timeline: Snapshots.
@@ -100,15 +102,17 @@ class Player:
         every: float,
         limit: float,
         inputs: Sequence[ExternalInput] = (),
+        link: OperatorLink | None = None,
     ) -> None:
         self.simulation, self.world = simulation, world
+        self._underway = Underway(link or OperatorLink(), float(simulation.state.context.clock.dt))
         self.timeline = Timeline(simulation, world, every, 0.5 * limit)
         self.history = History(simulation, world, 0.5 * limit)
         self.injections: list[Injection | Setting] = []
         self._inputs: Sequence[ExternalInput] = ()
         self._play_inputs(inputs)
         self.events: list[Event] = []
-        self.notes: list[str] = []
+        self.notes: list[str] = [] if link is None else [f"{link} (--link)"]
         self.curves = GameCurves(simulation, world, self.note)
         self.is_broken = False
         self._has_new_episode = False
@@ -141,6 +145,7 @@ class Player:
         """Make one step, unless the game is over."""
         if self.is_over:
             return
+        self._receive()
         sim, step = self.simulation, self.step
         sim.events.is_replaying = step < self._furthest_step
         self._furthest_step = max(self._furthest_step, step + 1)
@@ -156,6 +161,31 @@ class Player:
             sim.events.is_replaying = False
         self.step = self._read_step()
         self._remember()
+
+    def send(self, order: Any, do: Callable[[], None], is_sure: bool = False) -> None:
+        """Let an order go over the link, and be carried out when it arrives.
+
+        Args:
+            order: What is sent, see `Underway.send`.
+            do: Carries it out.
+            is_sure: It is not lost.
+
+        Raises:
+            TussleError: It arrives at once, and cannot be carried out.
+        """
+        self._underway.send(order, self.step, self.simulation.state.context.keys[[self.world]], do, is_sure)
+        for each in self._underway.take(self.step):
+            each()
+
+    def _receive(self) -> None:
+        """Carry out the orders that arrive now."""
+        for do in self._underway.take(self.step):
+            try:
+                do()
+            except TussleError as error:
+                if isinstance(error, PluginError):
+                    raise
+                self.note(str(error))
 
     def _give(self, given: Injection | Setting) -> None:
         """Let what came from outside come now."""
@@ -211,6 +241,10 @@ class Player:
         step, here = max(step, self.first_step), self.step
         if step == here and not self.is_broken:
             return step
+        if n := self._underway.clear():
+            self.note(
+                f"{counted(n, 'order')} on the way did not arrive: the time jumped from step {here} to {step}"
+            )
         is_back = step < here or self.is_broken
         if is_back and self.timeline.refusal:
             self.note(f"the game cannot be rewound: {self.timeline.refusal}")
@@ -353,6 +387,7 @@ class Player:
         for part in (self.timeline, self.history, self.curves):
             part.clear()
         self.injections.clear()
+        self._underway = Underway(self._underway.link, float(self.simulation.state.context.clock.dt))
         self._play_inputs(())
         self.events.clear()
         self.is_broken = False
