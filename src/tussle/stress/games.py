@@ -64,7 +64,7 @@ class StressGame:
     def branch(self, step: int, key: int) -> StressGame:
         """The same game up to the state at the start of a step, and from there on with other luck."""
         kept = tuple(change for change in self.rekeys if change[0] < step)
-        return replace(self, rekeys=(*kept, (step, key)))
+        return StressGame(self.seed, (*kept, (step, key)), self.values, self.mission)
 
 
 @dataclass(frozen=True)

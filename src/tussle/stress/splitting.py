@@ -70,31 +70,30 @@ def repetition(
     """
     games = [StressGame((first_seed + number * n + i) % 2**64) for i in range(n)]
     played = list((yield games))
+    robustness = np.array([p.verdict.robustness for p in played])
     result.n_games = n
     round_ = 0
     while True:
-        robustness = np.array([p.verdict.robustness for p in played])
         level = float(np.sort(robustness)[n - n_replaced])
         if level < 0.0:
             break
         is_lost = robustness >= level
-        survivors = [p for p, lost in zip(played, is_lost, strict=True) if not lost]
-        lost = np.flatnonzero(is_lost)
+        survivors, lost = np.flatnonzero(~is_lost), np.flatnonzero(is_lost)
         result.levels.append(level)
         result.shares.append(len(lost) / n)
         result.probability *= len(survivors) / n
-        if not survivors:
+        if not len(survivors):
             return
         draws = uniform(first_seed % 2**64, CHOICE, lost, np.full(len(lost), round_), number)[0]
+        parents = survivors[np.minimum((draws * len(survivors)).astype(np.int64), len(survivors) - 1)]
         branches = []
-        for place, draw in zip(lost.tolist(), draws.tolist(), strict=True):
-            parent = survivors[min(int(draw * len(survivors)), len(survivors) - 1)]
-            step = parent.verdict.first_below(level)
+        for place, parent in zip(lost.tolist(), parents.tolist(), strict=True):
+            step = played[parent].verdict.first_below(level)
             assert step is not None
             key = stream_key("stress", "branch", f"{first_seed} {number} {round_} {place}")
-            branches.append(parent.game.branch(step, key))
+            branches.append(played[parent].game.branch(step, key))
         for place, branch in zip(lost.tolist(), (yield branches), strict=True):
-            played[place] = branch
+            played[place], robustness[place] = branch, branch.verdict.robustness
         result.n_games += len(lost)
         round_ += 1
     result.failures = [p for p in played if p.verdict.has_failed]

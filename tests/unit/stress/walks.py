@@ -8,7 +8,6 @@ import numpy as np
 
 from tussle.numeric.rng import normal, stream_key, uniform
 from tussle.stress import Played, Verdict
-from tussle.stress.formulas import records
 
 STREAM = stream_key("walk")
 NORMAL, UNIFORM = 0, 1  # kinds of draws
@@ -32,17 +31,22 @@ def playing(path, steps):
                 for step, key in game.rekeys:
                     row[step:] = key
             robustness = np.minimum.accumulate(path(partial(draw, keys=keys), len(some)), axis=1)
-            found += map(partial(_played, steps), some, robustness)
+            found += _played(steps, some, robustness)
         return found
 
     return play
 
 
-def _played(steps, game, robustness):
-    falls, levels = records(robustness)
-    return Played(
-        game, Verdict(float(robustness[-1]), falls.tolist(), levels.tolist()), float(steps), 0.0, ""
-    )
+def _played(steps, games, robustness):
+    """What came of games whose robustness never rises, (n, steps + 1)."""
+    is_lower = np.diff(robustness, axis=1, prepend=np.inf) < 0.0
+    rows, falls = np.nonzero(is_lower)
+    ends = np.cumsum(np.bincount(rows, minlength=len(games))).tolist()
+    falls, levels, last = falls.tolist(), robustness[is_lower].tolist(), robustness[:, -1].tolist()
+    return [
+        Played(game, Verdict(least, falls[begin:end], levels[begin:end]), float(steps), 0.0, "")
+        for game, least, begin, end in zip(games, last, [0, *ends], ends, strict=False)
+    ]
 
 
 def brownian(p):
