@@ -1,8 +1,7 @@
-"""Faults of channels: when they begin and end, and what they do to the numbers."""
+"""Faults of channels: what they do to the numbers."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping
 from functools import cache
 from typing import Any
@@ -10,10 +9,9 @@ from typing import Any
 import numpy as np
 
 from tussle.api.group import GroupView
-from tussle.api.kinds import EntityPlugin
+from tussle.api.timed_fault import TimedFault
 from tussle.declare.columns import Param, State
 from tussle.errors import ParameterError, listed, nearest_name
-from tussle.numeric import exp
 
 FAULTS = "dropout", "bias", "freeze", "delay", "saturate", "reverse"
 MAX_DELAY = 1000
@@ -61,12 +59,8 @@ class ChannelsParam(Param):
         return text
 
 
-class ChannelFault(EntityPlugin):
-    """A fault that alters channels of an entity for some time; abstract.
-
-    A fault begins at `start_after`, with `probability` for each entity, and besides at random with `failure_rate`, and lasts for
-    `duration`. A second one that begins meanwhile makes it longer.
-    """
+class ChannelFault(TimedFault):
+    """A fault that alters channels of an entity for some time; abstract."""
 
     channels: str
     fault = Param("dropout", choices=FAULTS, doc="What happens to the channels.")
@@ -77,17 +71,6 @@ class ChannelFault(EntityPlugin):
     delay = Param(
         5, ge=1, le=MAX_DELAY, structural=True, doc="Calls of the plugin by which delayed values are late."
     )
-    start_after = Param(
-        0.0, unit="s", doc="Time at which the fault begins; inf for only those that begin at random."
-    )
-    probability = Param(
-        1.0, ge=0.0, le=1.0, doc="Probability that an entity has the fault that begins at start_after."
-    )
-    failure_rate = Param(0.0, unit="1/s", ge=0.0, doc="Faults of an entity that begin at random, per time.")
-    duration = Param(math.inf, unit="s", gt=0.0, doc="Time that a fault lasts.")
-    until = State(unit="s", default=-math.inf, doc="Time at which the fault ends.")
-    is_decided = State(dtype=bool, doc="Whether it has been drawn if the fault of start_after happens.")
-    is_faulty = State(dtype=bool, recorded=True, doc="Whether there is a fault.")
     held = State(doc="Values of frozen channels.")
     past = State(doc="Values of the last calls, newest first, for delayed ones.")
     has_past = State(dtype=bool, doc="Whether there was a call.")
@@ -108,7 +91,7 @@ class ChannelFault(EntityPlugin):
 
     def altered(self, g: GroupView, true: np.ndarray) -> np.ndarray:
         """Advance the fault by a call, and return what becomes of the values of the channels, (k, n)."""
-        begins = self._begin(g)
+        begins = self.begin(g)
         if self.fault == "freeze":
             self.held[:, begins] = true[:, begins]
             wrong = self.held
@@ -123,18 +106,6 @@ class ChannelFault(EntityPlugin):
         else:
             wrong = np.broadcast_to(self.value, true.shape)
         return np.where(self.is_faulty, wrong, true)
-
-    def _begin(self, g: GroupView) -> np.ndarray:
-        """Find out which rows have a fault, and return in which it begins, (n,)."""
-        now = g.t + 1e-6 * g.dt
-        is_due = ~self.is_decided & (now >= self.start_after)
-        self.is_decided |= is_due
-        happens = is_due & (g.uniform("happens") < self.probability)
-        happens |= g.uniform("begins") < 1.0 - exp(-self.failure_rate * g.dt)
-        self.until[happens] = np.maximum(self.until, g.t + self.duration)[happens]
-        was_faulty = self.is_faulty.copy()
-        self.is_faulty[:] = now < self.until
-        return np.asarray(self.is_faulty & ~was_faulty)
 
     def _remember(self, true: np.ndarray) -> np.ndarray:
         """Store the values, and return those of `delay` calls before; the first ones where there were fewer calls."""

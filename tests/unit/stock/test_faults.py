@@ -9,7 +9,7 @@ import pytest
 from test_radio_network import hears, is_near, n_heard, talks
 
 from tussle import Block, Mission, Simulation
-from tussle.api import Autonomy, Input, MotionModel, Output, Sensor
+from tussle.api import Autonomy, Input, MotionModel, Output, Sensor, State
 from tussle.api.channels import CHANNEL_UNITS, MEASURED_CHANNELS
 from tussle.errors import ParameterError, WiringError
 from tussle.plugins import stock
@@ -17,6 +17,7 @@ from tussle.stock import (
     GPS,
     ActuatorFault,
     FailingRadio,
+    Hijack,
     NoisyState,
     RigidBody6DOF,
     SensorFault,
@@ -171,6 +172,39 @@ def test_some_entities_have_the_fault():
     assert counts[0] == 0
     assert abs(counts[1] - 300) < 4.0 * np.sqrt(1000 * 0.3 * 0.7)
     assert counts[2] == counts[1]
+
+
+def counter(channels, value):
+    """An autonomy that writes a number that rises by 1 with each of its steps, in its memory."""
+
+    def step(self, g):
+        for name in channels:
+            getattr(self, name)[:] = value + self.n
+        self.n += 1
+
+    body = {name: Output(unit=CHANNEL_UNITS[name]) for name in channels}
+    return type("Counter", (Autonomy,), {**body, "n": State(), "step": step, "__doc__": "Counts."})()
+
+
+def test_a_hijacked_robot_is_flown_by_the_adversary_until_it_is_given_back():
+    names = ["velocity_x", "velocity_y", "velocity_z"]
+    own, adversary = counter(names, 1.0), counter(names[:1], -50.0)
+    taken = Hijack(autonomies=[own], adversary=[adversary], start_after=0.3, duration=0.2, probability=0.5)
+    sim, seen, hijacked = flight(count=40, autonomy=taken, motion=SingleIntegrator(max_speed=1e3)), [], []
+    for _ in range(8):
+        sim.step()
+        seen.append(sim.read("a.vel")[0][0, :, :].T)
+        hijacked.append(sim.read("a.Hijack.is_faulty")[0][0].copy())
+    is_taken = hijacked[3]
+    assert 5 < is_taken.sum() < 35
+    assert [h.tolist() for h in hijacked] == [(is_taken & (k in (3, 4))).tolist() for k in range(8)]
+    x = np.array([v[0] for v in seen])
+    assert x[:, ~is_taken].T.tolist() == [[1, 2, 3, 4, 5, 6, 7, 8]] * (~is_taken).sum()
+    assert x[:, is_taken].T.tolist() == [[1, 2, 3, -50, -49, 1, 2, 3]] * is_taken.sum()
+    y = np.array([v[1] for v in seen])
+    assert y[:, is_taken].T.tolist() == [[1, 2, 3, 3, 3, 1, 2, 3]] * is_taken.sum(), (
+        "it keeps what nobody commands"
+    )
 
 
 def test_what_is_refused():
