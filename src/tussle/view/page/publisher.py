@@ -28,7 +28,7 @@ from tussle.view.page.document import event_rows
 from tussle.view.page.drawing import drawing_message
 from tussle.view.page.facts import mission_facts
 from tussle.view.page.failures import Failures
-from tussle.view.page.formatting import entity_sections, feed_rows, result_rows
+from tussle.view.page.formatting import alarm_rows, entity_sections, feed_rows, result_rows
 from tussle.view.page.packing import message
 from tussle.view.series import OF_TEAMS, Changes, CurveName, StepSeries
 
@@ -253,6 +253,7 @@ class FramePublisher:
             "entity": self._entity(reader), "refusal": refusal, "steers": self._may_steer(reader),
             "role": {"kind": reader.role.kind, "team": reader.role.team},
             "feed": feed_rows(live.messages()) if reader.has_feed else None,
+            "alarms": alarm_rows(live.alarms(), live.time_of),
         }  # fmt: skip
 
     def _new_events(self, reader: Reader) -> dict[str, Any]:
@@ -267,13 +268,15 @@ class FramePublisher:
 
     def _new_curves(self, reader: Reader) -> dict[str, Any] | None:
         """Return the changes that a browser does not have yet, of the quantities that it wants, and the names of all results."""
-        series = dict(self._live.curves.series)
+        robustness = self._live.robustness
+        series = self._live.curves.series | robustness
         results = sorted({q.name for q in series if not q.id and q.name not in OF_TEAMS})
         has_names = results != reader.results_sent
         reader.results_sent = results
         changes: list[Changes] = []
         for quantity, each in series.items():
-            if quantity.name not in OF_TEAMS and (quantity.name, quantity.id) not in reader.wanted:
+            is_shown = quantity.name in OF_TEAMS or quantity in robustness
+            if not is_shown and (quantity.name, quantity.id) not in reader.wanted:
                 continue
             sent, n_sent = reader.changes_sent.get(quantity, (None, 0))
             start, end = n_sent if sent is each else 0, len(each.values)

@@ -12,6 +12,7 @@ import { EventLine } from './events.js';
 import { LiveClock, RecordedClock } from './timeline.js';
 import { Panels } from './panels.js';
 import { MessagePanel } from './feed.js';
+import { AlarmPanel } from './alarms.js';
 import { Drive } from './drive.js';
 import { OrderForm } from './orders.js';
 import { QuantityPanel } from './quantities.js';
@@ -89,6 +90,7 @@ export class Player {
     this.orders = new OrderForm(this);
     this.drive = new Drive(this);
     this.feed = new MessagePanel(this);
+    this.alarms = new AlarmPanel(this);
     this.quantities = new QuantityPanel(this);
     this.steering = new Steering(this.canvas, this);
     drawn.labels = layer.mostAtOnce <= FEW.labels;
@@ -251,6 +253,7 @@ export class Player {
     this.orders.show();
     this.drive.show();
     this.feed.show();
+    this.alarms.show();
     this.quantities.show(clock.t);
     this.events.update(clock.t);
     clock.show(clock.t, clock.isPlaying, clock.speed);
