@@ -260,8 +260,9 @@ class FramePublisher:
         """Return the events that a browser does not have yet, and how many of the earlier ones are still valid."""
         events, sent = self._live.events, reader.events_sent
         n = len(sent)
-        if n > len(events) or (n and events[n - 1] is not sent[-1]):
-            n = 0
+        if events[:n] != sent:  # an alarm is older than what came after it, for example
+            pairs = enumerate(zip(events, sent, strict=False))
+            n = next((i for i, (one, other) in pairs if one != other), min(len(events), n))
         new = events[n : n + MAX_EVENTS]
         reader.events_sent = events[: n + len(new)]
         return {"from": n, "rows": event_rows(new)}

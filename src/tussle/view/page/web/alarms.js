@@ -1,6 +1,6 @@
 // The card of specifications: how far the game is from breaking each, and since when there is an alarm.
 /** @import { Player } from './player.js' */
-/** @import { SpecificationState } from './types' */
+/** @import { GameEvent, SpecificationState } from './types' */
 
 import { amount, byId, element, parseColour, say, styled } from './formatting.js';
 import { Live } from './live.js';
@@ -14,6 +14,8 @@ export class AlarmPanel {
     this.box = byId('alarms');
     /** The specifications that are shown. @type {SpecificationState[]} */
     this.shown = [];
+    /** Alarms that were told. @type {Set<string>} */
+    this.told = new Set();
   }
 
   show() {
@@ -22,7 +24,10 @@ export class AlarmPanel {
     this.shown = layer.status.alarms;
     this.box.hidden = !this.shown.length;
     while (this.box.children.length < this.shown.length) this.add(this.box.children.length);
-    this.shown.forEach((each, i) => this.showRow(this.box.children[i], each, layer));
+    this.shown.forEach((each, i) => {
+      this.showRow(this.box.children[i], each, layer);
+      this.tell(each);
+    });
   }
 
   /** @param {number} i */
@@ -33,10 +38,17 @@ export class AlarmPanel {
   }
 
   /** To the moment of the alarm; without one, to where it was nearest to failure. @param {SpecificationState} spec */
-  go({ text, state, since, leastAt }) {
+  go(spec) {
     const { player } = this;
-    if (since !== null) player.jump({ t: since, kind: state === 'failed' ? 'failure' : 'alarm', id: 0, other: 0, text });
-    else if (leastAt !== null) player.clock.seek(leastAt);
+    if (spec.since !== null) player.jump(alarmOf(spec));
+    else if (spec.leastAt !== null) player.clock.seek(spec.leastAt);
+  }
+
+  /** Say a new alarm, once. @param {SpecificationState} spec */
+  tell(spec) {
+    const key = `${spec.text}\n${spec.state}\n${spec.since}`;
+    if (spec.since !== null && !this.told.has(key)) this.player.tell(alarmOf(spec));
+    this.told.add(key);
   }
 
   /** @param {Element} row @param {SpecificationState} spec @param {Live} layer */
@@ -57,3 +69,6 @@ export class AlarmPanel {
     panels.drawCurve(/** @type {HTMLCanvasElement} */ (canvas), series, series.range([0, 0]), clock.t, { colour });
   }
 }
+
+/** The event with which an alarm began. @param {SpecificationState} spec @returns {GameEvent} */
+const alarmOf = ({ text, state, since }) => ({ t: since, kind: state === 'failed' ? 'failure' : 'alarm', id: 0, other: 0, text });

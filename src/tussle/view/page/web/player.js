@@ -364,8 +364,13 @@ export class Player {
   /** @param {GameEvent} event */
   jump(event) {
     this.clock.seek(event.t);
-    this.say(`${event.t.toFixed(this.clock.decimals)} s: ${eventText(event, (id) => this.layer.who(id))}`);
+    this.tell(event);
     this.look();
+  }
+
+  /** Say what happened, and when. @param {GameEvent} event */
+  tell(event) {
+    this.say(`${event.t.toFixed(this.clock.decimals)} s: ${eventText(event, (id) => this.layer.who(id))}`);
   }
 }
 
