@@ -46,8 +46,8 @@ class SpecificationState:
         now: Robustness of the present alone; NaN where that is not known.
         ended: Robustness of the game if it ended now; NaN of a game that was rewound.
         least: The least robustness so far; inf while nothing is known.
-        least_step: Step at which it was reached; None while nothing is known.
-        since: Step from which on it is near, or has failed; None otherwise.
+        reached: Time at which it was reached [s]; None while nothing is known.
+        since: Time from which on it is near, or has failed [s]; None otherwise.
         note: Why it cannot be computed.
     """
 
@@ -57,8 +57,8 @@ class SpecificationState:
     now: float = math.nan
     ended: float = math.nan
     least: float = math.inf
-    least_step: int | None = None
-    since: int | None = None
+    reached: float | None = None
+    since: float | None = None
     note: str = ""
 
 
@@ -81,6 +81,8 @@ class _Watched:
         except ParameterError as error:
             self.note = str(error)
             return
+        if not np.isfinite(self.present).any():
+            return
         # Births of the next step still belong to the present sample, so it is not kept yet.
         for step in range(self.curve.last + 1, len(self.present) - (not is_over)):
             self.curve = self.curve.add(step, float(self.present[step]))
@@ -94,7 +96,7 @@ class _Watched:
         n = int(np.searchsorted(-self.known, -level, side="right"))
         return n if n < len(self.known) else None
 
-    def state_at(self, step: int, margin: float) -> SpecificationState:
+    def state_at(self, step: int, margin: float, time_of: Callable[[int], float]) -> SpecificationState:
         text, unit = self.monitor.text, self.monitor.unit
         if self.note or step >= len(self.known):
             return SpecificationState(text, unit, "unknown", note=self.note)
@@ -102,11 +104,11 @@ class _Watched:
         now, least = float(self.present[step]), float(self.known[step])
         state, since = "open" if least == math.inf else "holds", None
         if near is not None and near <= step:
-            state, since = "near", near
+            state, since = "near", time_of(near)
         if failed is not None and failed <= step:
-            state, since = "failed", failed
+            state, since = "failed", time_of(failed)
         ended = self.ended if step == len(self.known) - 1 else math.nan
-        reached = int(np.searchsorted(-self.known, -least)) if least < math.inf else None
+        reached = time_of(int(np.searchsorted(-self.known, -least))) if least < math.inf else None
         return SpecificationState(text, unit, state, now, ended, least, reached, since)
 
 
@@ -118,9 +120,6 @@ class SpecificationAlarms:
         margin: Distance from failure below which there is an alarm, in the unit of what is compared.
         world: Number of the world.
         time_of: Time of a step [s].
-
-    Attributes:
-        events: The alarms, in order: "alarm" within the margin, "failure" when a specification has failed.
     """
 
     def __init__(
@@ -137,7 +136,6 @@ class SpecificationAlarms:
     def clear(self) -> None:
         """Forget everything."""
         self._last, self._is_final = -1, False
-        self.events: list[Event] = []
         for each in self._watched:
             each.clear()
 
@@ -146,17 +144,11 @@ class SpecificationAlarms:
         self._last, self._is_final = min(self._last, step - 1), False
         for each in self._watched:
             each.forget_after(step)
-        self._find()
 
     @property
     def series(self) -> dict[CurveName, StepSeries]:
         """Robustness at each step, of specifications of which it is known then."""
-        found = {CurveName(each.monitor.text): each.curve for each in self._watched}
-        return {
-            name: curve
-            for name, curve in found.items()
-            if len(curve.values) > 1 or np.isfinite(curve.values).any()
-        }
+        return {CurveName(each.monitor.text): each.curve for each in self._watched if each.curve.values}
 
     def read(self, step: int, is_over: bool) -> list[SpecificationState]:
         """State of each specification at the present step."""
@@ -164,10 +156,11 @@ class SpecificationAlarms:
             self._last, self._is_final = step, is_over
             for each in self._watched:
                 each.read(self._world, is_over)
-            self._find()
-        return [each.state_at(step, self._margin) for each in self._watched]
+        return [each.state_at(step, self._margin, self._time_of) for each in self._watched]
 
-    def _find(self) -> None:
+    @property
+    def events(self) -> list[Event]:
+        """The alarms, in order: "alarm" within the margin, "failure" when a specification has failed."""
         found = []
         for each in self._watched:
             near, failed = each.first_below(self._margin), each.first_below(0.0)
@@ -175,5 +168,4 @@ class SpecificationAlarms:
                 found.append(Event(self._time_of(near), "alarm", 0, 0, each.monitor.text))
             if failed is not None:
                 found.append(Event(self._time_of(failed), "failure", 0, 0, each.monitor.text))
-        known = {each: each for each in self.events}  # what a browser has is known by its identity
-        self.events = sorted((known.get(each, each) for each in found), key=lambda each: each.t)
+        return sorted(found, key=lambda each: each.t)

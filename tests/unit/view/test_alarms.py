@@ -113,7 +113,7 @@ def test_after_a_jump_back_the_state_is_that_of_the_moment_and_goes_on_the_same(
             live.seek(t)
             assert alarms_of(live) == there, "what comes later stays marked, as events do"
             for state in live.alarms():
-                assert state.since is None or state.since <= live.step_number
+                assert state.since is None or state.since <= live.t
                 assert state.state in ("holds", "open") or state.since is not None
         live.seek(5.0)
         live.step(100)

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -12,7 +11,6 @@ from tussle.declare import displays
 from tussle.declare.units import split_units, unit_of
 from tussle.engine.result import WorldResult
 from tussle.errors import clipped
-from tussle.view.alarms import SpecificationState
 from tussle.view.entity import EntityState, Reading, ShownMessage
 from tussle.view.feed import TopicTraffic
 
@@ -133,28 +131,3 @@ def feed_rows(topics: Sequence[TopicTraffic]) -> list[tuple[str, int, str]]:
 def _message_row(message: ShownMessage) -> Row:
     fields = "; ".join(f"{name} {number(value)}" for name, value in message.fields.items())
     return message.topic, f"{message.sender or 'world'}: {fields}"
-
-
-def alarm_rows(states: Sequence[SpecificationState], time_of: Callable[[int], float]) -> list[dict[str, Any]]:
-    """Return what the page shows of each specification; numbers that are not finite are None."""
-
-    def finite(value: float) -> float | None:
-        return value if math.isfinite(value) else None
-
-    def time(step: int | None) -> float | None:
-        return None if step is None else time_of(step)
-
-    return [
-        {
-            "text": each.text,
-            "unit": each.unit,
-            "state": each.state,
-            "now": finite(each.now),
-            "ended": finite(each.ended),
-            "least": finite(each.least),
-            "leastAt": time(each.least_step),
-            "since": time(each.since),
-            "note": each.note,
-        }
-        for each in states
-    ]

@@ -28,7 +28,7 @@ from tussle.view.page.document import event_rows
 from tussle.view.page.drawing import drawing_message
 from tussle.view.page.facts import mission_facts
 from tussle.view.page.failures import Failures
-from tussle.view.page.formatting import alarm_rows, entity_sections, feed_rows, result_rows
+from tussle.view.page.formatting import entity_sections, feed_rows, result_rows
 from tussle.view.page.packing import message
 from tussle.view.series import OF_TEAMS, Changes, CurveName, StepSeries
 
@@ -253,7 +253,10 @@ class FramePublisher:
             "entity": self._entity(reader), "refusal": refusal, "steers": self._may_steer(reader),
             "role": {"kind": reader.role.kind, "team": reader.role.team},
             "feed": feed_rows(live.messages()) if reader.has_feed else None,
-            "alarms": alarm_rows(live.alarms(), live.time_of),
+            "alarms": [
+                {k: None if isinstance(v, float) and not math.isfinite(v) else v for k, v in asdict(each).items()}
+                for each in live.alarms()
+            ],
         }  # fmt: skip
 
     def _new_events(self, reader: Reader) -> dict[str, Any]:

@@ -41,7 +41,7 @@ export class AlarmPanel {
   go(spec) {
     const { player } = this;
     if (spec.since !== null) player.jump(alarmOf(spec));
-    else if (spec.leastAt !== null) player.clock.seek(spec.leastAt);
+    else if (spec.reached !== null) player.clock.seek(spec.reached);
   }
 
   /** Say a new alarm, once. @param {SpecificationState} spec */
@@ -52,7 +52,7 @@ export class AlarmPanel {
   }
 
   /** @param {Element} row @param {SpecificationState} spec @param {Live} layer */
-  showRow(row, { text, unit, state, now, ended, least, leastAt, since, note }, layer) {
+  showRow(row, { text, unit, state, now, ended, least, reached, since, note }, layer) {
     const { clock, panels } = this.player;
     const [stateText, value, title, canvas, more] = row.children;
     const time = (/** @type {number} */ t) => `${t.toFixed(clock.decimals)} s`;
@@ -62,7 +62,7 @@ export class AlarmPanel {
     say(stateText, since === null ? STATES[state] : `${STATES[state]} since ${time(since)}`);
     say(value, now === null ? '' : `now ${measure(now)}`);
     say(title, text);
-    say(more, note || (least !== null ? `least ${measure(least)} at ${time(leastAt)}` : ended !== null ? `${measure(ended)} if it ended now` : ''));
+    say(more, note || (least !== null ? `least ${measure(least)} at ${time(reached)}` : ended !== null ? `${measure(ended)} if it ended now` : ''));
     const series = layer.series.of(text);
     canvas.toggleAttribute('hidden', !series.t.length);
     const colour = parseColour(styled(state === 'failed' ? '--failed' : state === 'near' ? '--note' : '--accent'));

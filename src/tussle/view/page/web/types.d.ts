@@ -53,7 +53,7 @@ export interface Status {
 
 /** How far a game is from breaking a specification, see alarms.py; null where a number is not known. */
 export interface SpecificationState {
-  text: string; unit: string; state: 'holds' | 'near' | 'failed' | 'open' | 'unknown'; now: number | null; ended: number | null; least: number | null; leastAt: number | null;
+  text: string; unit: string; state: 'holds' | 'near' | 'failed' | 'open' | 'unknown'; now: number | null; ended: number | null; least: number | null; reached: number | null;
   since: number | null; note: string;
 }
 
