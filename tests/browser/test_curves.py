@@ -8,6 +8,7 @@ from served import UNHURRIED, Watched
 
 from tussle import Recorder, Simulation
 from tussle.batch import Batch, InProcess
+from tussle.stress import Monitor, Specification
 from tussle.view import Live, Recording
 from tussle.view.entity import entity_state
 from tussle.view.page.compare import Comparison
@@ -95,6 +96,55 @@ def test_the_numbers_of_a_live_game_are_what_tussle_run_prints_at_that_step(chro
             }
         watched.close()
         assert not watched.trouble
+
+
+def test_a_specification_shows_its_robustness_and_a_click_goes_to_its_alarm(chromium):
+    text_of_spec, mission = "always (distance(guard, intruder) > 21.5 m)", guarded_gate()
+    with Simulation(mission, SEED) as alone:
+        monitor = Monitor(Specification.parse(text_of_spec, mission), alone)
+        alone.run()
+        (_, present, _), verdict = monitor.progress(0), monitor.finish(0)
+    near, failed = verdict.first_below(2.0), verdict.first_below(0.0)
+    with Simulation(mission, SEED) as simulation:
+        monitors = [Monitor(Specification.parse(text_of_spec, mission), simulation)]
+        with (
+            Live(simulation, is_paused=True, pace=None, specifications=monitors, margin=2.0) as live,
+            Page(live, viewer=UNHURRIED) as page,
+        ):
+            watched = Watched(chromium, page, {"width": 1200, "height": 800})
+            row = "document.querySelector('#alarms .spec')"
+            shown = {}
+            for step in (near - 1, near, failed + 5):
+                live.step(step - live.step_number)
+                live.settle()
+                watched.wait(
+                    f"player.frame === {step} && player.isDrawn && player.status.step === {step} && {row}"
+                )
+                watched.wait(
+                    f"{row}.children[1].innerText.includes('now {present[step]:.4g}'.replace('-', '−'))"
+                )
+                shown[step] = watched.tab.evaluate(f"() => [{row}.className, {row}.innerText]")
+            assert f"s: failed: {text_of_spec}" in watched.tab.locator("#said").inner_text()
+            states = ["spec is-holds", "spec is-near", "spec is-failed"]
+            assert [name for name, _ in shown.values()] == states
+            assert f"near since {0.1 * near:.1f} s" in shown[near][1]
+            assert f"failed since {0.1 * failed:.1f} s" in shown[failed + 5][1]
+            assert text_of_spec in shown[near][1]
+            events = watched.wait("player.events.filter(({ text }) => text.startsWith('always')).map(({ t, kind }) => [t, kind])"
+                                  ".length === 2 && player.events.filter(({ text }) => text.startsWith('always'))")  # fmt: skip
+            assert [(e["kind"], round(10 * e["t"])) for e in events] == [("alarm", near), ("failure", failed)]
+            watched.tab.locator("#alarms .spec").click()
+            watched.until(lambda: live.step_number == failed)
+            watched.wait(f"player.frame === {failed}")
+            watched.tab.locator("#ticker button", has_text="near failure").click()
+            watched.until(lambda: live.step_number == near)
+            watched.wait(f"player.frame === {near} && {row}.className === 'spec is-near'")
+            curve = watched.tab.evaluate("(name) => player.curve(name)", text_of_spec)
+            values = {round(10 * t): value for t, value in curve}
+            assert values[failed] == pytest.approx(present[failed])
+            assert values[near] == pytest.approx(present[near])
+            watched.close()
+            assert not watched.trouble
 
 
 @pytest.fixture(scope="module")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated
 
@@ -237,6 +237,20 @@ class ViewOptions(AgainOptions, PageOptions):
             "Let orders come later [s], be lost with a probability, or share a bandwidth [bytes/s].",
         ),
     ] = None
+    spec: Annotated[
+        list[str],
+        option(
+            "SPEC",
+            "Show how far the game is from breaking this, and alarms: 'always (distance(team 1, team 1) > 2 m)'. Can be repeated.",
+        ),
+    ] = field(default_factory=list)
+    margin: Annotated[
+        float | None,
+        option(
+            "X",
+            "With --spec: alarm within this distance of failing, in the unit compared (SI); by default 1.",
+        ),
+    ] = None
     exit_when_over: Annotated[bool, flag("--exit-when-over", "End with the game, not only by Ctrl-C.")] = (
         False
     )
@@ -246,6 +260,9 @@ class ViewOptions(AgainOptions, PageOptions):
         PageOptions.__post_init__(self)
         if self.record_columns is not None and self.record is None:
             raise typer.BadParameter("--record-columns is allowed with --record only")
+        if self.margin is not None and not self.spec:
+            raise typer.BadParameter("--margin is allowed with --spec only")
+        check_positive(margin=self.margin)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
-from typing import Any
+from functools import partial
+from typing import TYPE_CHECKING, Any
 
 from tussle.cli.interrupt import Interrupt
 from tussle.cli.play import planned_by, record, simulate
@@ -13,12 +14,17 @@ from tussle.cli.play_options import PageOptions, ReplayOptions, ViewOptions
 from tussle.cli.progress import compiling
 from tussle.cli.summary import Speed, show_summary
 from tussle.cli.terminal import OK, TERMINATED, err, out, say, say_error, say_note
+from tussle.engine.simulation import Simulation
+from tussle.mission import Mission
 from tussle.pacing import POLL_PERIOD
 from tussle.view.link import OperatorLink
 from tussle.view.live import Live
 from tussle.view.page.compare import Comparison
 from tussle.view.page.server import Page
 from tussle.view.recording import Recording
+
+if TYPE_CHECKING:
+    from tussle.stress import Monitor
 
 
 def view(options: ViewOptions) -> int:
@@ -37,9 +43,13 @@ def view(options: ViewOptions) -> int:
         options.read() if planned is None else (planned.loaded, planned.mission, planned.seed)
     )
     viewer = loaded.viewer
+    watchings = watchings_of(options.spec, mission)
     with ExitStack() as stack:
         with compiling():
             simulation = stack.enter_context(simulate(loaded, mission, seed))
+            monitors = [watching(simulation) for watching in watchings]
+            for monitor in monitors:
+                monitor.check()
         interrupt = stack.enter_context(Interrupt())
         simulation.state.context.is_interrupted = lambda: bool(interrupt.code)
         recorder = None
@@ -62,6 +72,8 @@ def view(options: ViewOptions) -> int:
             is_paused=options.paused or bool(viewer.get("start_paused", False)),
             inputs=() if planned is None else planned.inputs,
             link=link,
+            specifications=monitors,
+            margin=1.0 if options.margin is None else options.margin,
         )
         stack.callback(live.stop)
         page = stack.enter_context(Page(live, host=options.host, port=options.port, has_roles=options.roles))
@@ -84,6 +96,19 @@ def view(options: ViewOptions) -> int:
     if error is not None:
         raise error
     return code
+
+
+def watchings_of(texts: Sequence[str], mission: Mission) -> list[Callable[[Simulation], Monitor]]:
+    """What makes the monitors of specifications, which are read before anything is compiled.
+
+    Raises:
+        ParameterError: A text is no specification, or names what the mission does not have.
+    """
+    if not texts:
+        return []
+    from tussle.stress import Monitor, Specification
+
+    return [partial(Monitor, Specification.parse(text, mission)) for text in dict.fromkeys(texts)]
 
 
 def _pace_of(viewer: dict[str, Any]) -> float | None:

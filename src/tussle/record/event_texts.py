@@ -5,11 +5,13 @@ from __future__ import annotations
 import re
 
 EVENT_TEXTS = {
+    "alarm": ["near failure: {text}"],
     "birth": ["{id} was born"],
     "capture": ["{id} captured {other}"],
     "collision": ["{id} and {other} collided", "{id} hit the {text}", "{id} hit the ground"],
     "death": ["{id} died: {text} ({other})", "{id} died: {text}", "{id} died ({other})", "{id} died"],
     "difference": ["the two runs differ from here on"],
+    "failure": ["failed: {text}"],
     "flag": ["{id} {text}"],
     "end": ["the game ended: {text}"],
 }

@@ -85,6 +85,11 @@ class Formula:
         out[min(self.delay, len(values) - 1) :] = values[0]
         return out
 
+    def present(self, traces: Traces) -> np.ndarray:
+        """Robustness of each sample alone, (n,): under `always`, that of what must hold then. NaN where that is not known at once."""
+        values = self.over(traces)
+        return values if self.delay == 0 else np.full(len(values), np.nan)
+
 
 @dataclass(frozen=True)
 class Above(Formula):
@@ -145,6 +150,11 @@ class Every(Formula):
     def known(self, traces: Traces) -> np.ndarray:
         return self._of([part.known(traces) for part in self.parts])
 
+    def present(self, traces: Traces) -> np.ndarray:
+        if self.is_any:
+            return super().present(traces)
+        return np.asarray(np.fmin.reduce(np.stack([part.present(traces) for part in self.parts])))
+
     def _of(self, values: Sequence[np.ndarray]) -> np.ndarray:
         of = np.maximum if self.is_any else np.minimum
         return np.asarray(of.reduce(np.stack(np.broadcast_arrays(*values))))
@@ -191,6 +201,15 @@ class Window(Formula):
             out[begin : begin + len(least)] = least
             out[begin + len(least) :] = least[-1]
         out[-1] = np.min(seen, initial=np.inf)  # windows inside end with the game
+        return out
+
+    def present(self, traces: Traces) -> np.ndarray:
+        if self.is_any:
+            return super().present(traces)
+        values = self.inner.present(traces)
+        last = len(values) if self.last is None else self.last
+        out = np.full(len(values), np.nan)
+        out[self.first : last + 1] = values[self.first : last + 1]
         return out
 
 

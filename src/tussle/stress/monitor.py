@@ -126,6 +126,53 @@ class Monitor:
             self._verdicts[world] = verdict
         return self._verdicts[world]
 
+    # -- of a game that is watched, see `tussle.view.alarms.SpecificationMonitor` -----------------------------------------------------
+
+    @property
+    def text(self) -> str:
+        """The specification."""
+        return str(self.specification)
+
+    @property
+    def unit(self) -> str:
+        """SI unit of the robustness."""
+        return self.specification.unit
+
+    def check(self) -> None:
+        """Check that the game has what the specification names.
+
+        Raises:
+            ParameterError: There is no such quantity, or a signal cannot be computed.
+        """
+        self.specification.check(columns_of(self.sim.result(is_hashed=False)[0]))
+        self.trace(0)
+
+    def progress(self, world: int) -> tuple[np.ndarray, np.ndarray, float]:
+        """What a game that goes on has shown so far.
+
+        Steps that a rewound game plays again have the same samples, and those of another course replace them.
+
+        Returns:
+            What the robustness is at most, as known at the start of each step and now, (n_samples,); the robustness of each sample alone,
+            (n_samples,), NaN where that is not known; and the robustness if the game ended now. Where it has ended, the last of the first.
+
+        Raises:
+            ParameterError: A signal is not a number.
+        """
+        spec, sim, signals = self.specification, self.sim, self.trace(world)
+        is_over = not sim.state.running[world]
+        columns = columns_of(sim.result(is_hashed=False)[world]) if spec.quantities else {}
+        known, n = spec.known(signals, columns), int(sim.state.context.clock.step[world]) + 1
+        ended = float(known[-1])
+        if not signals:  # quantities alone are known at the end
+            known = np.full(n, np.inf)
+            known[-1] = ended if is_over else np.inf
+            return known, np.full(n, np.nan), ended
+        if not is_over:  # with one more sample, the last one counts as one of a game that goes on
+            longer = {name: np.append(values, values[-1]) for name, values in signals.items()}
+            known = spec.known(longer, columns)[:n]
+        return known, spec.present(signals, columns), ended
+
     def robustness(self) -> np.ndarray:
         """Robustness of each world, (n_worlds,): of the whole game where it has ended, else of the game so far."""
         return np.array([self.finish(world).robustness for world in range(self.sim.n_worlds)])

@@ -11,6 +11,7 @@ import numpy as np
 
 from tussle.batch.quantities import column_name
 from tussle.batch.stack import metrics_of
+from tussle.declare.units import COMPOUND_EXAMPLES, UNITS, unit_of
 from tussle.engine.result import WorldResult
 from tussle.engine.simulation import Simulation
 from tussle.errors import ParameterError, listed, nearest_name
@@ -82,6 +83,13 @@ class Specification:
         return [p for term in self.terms.values() for p in term.parts() if isinstance(p, AtEnd)]
 
     @property
+    def unit(self) -> str:
+        """SI unit of the robustness; "" without one, or where comparisons have different units."""
+        found = {term.unit for term in self.terms.values()}
+        names = [*UNITS, *COMPOUND_EXAMPLES]
+        return next((n for n in names if found == {unit_of(n).dimension} and unit_of(n).factor == 1), "")
+
+    @property
     def can_guide(self) -> bool:
         """Something of the robustness is known before a game ends, so that splitting can tell good games from better ones."""
         parts = [self.formula]
@@ -111,6 +119,16 @@ class Specification:
         Raises:
             ParameterError: A signal is not a number, or there is no such quantity.
         """
+        return self.formula.known(self._traces(signals, result))
+
+    def present(self, signals: Mapping[str, np.ndarray], result: Mapping[str, float]) -> np.ndarray:
+        """Robustness of each sample alone, (n_samples,), see `Formula.present`; arguments and errors as of `known`."""
+        return self.formula.present(self._traces(signals, result))
+
+    def _traces(
+        self, signals: Mapping[str, np.ndarray], result: Mapping[str, float]
+    ) -> dict[str, np.ndarray]:
+        """Values of each term, (n_samples,)."""
         columns = {name: np.array([value]) for name, value in result.items()}
         values: dict[str, np.ndarray] = dict(signals)
         for each in self.quantities:
@@ -125,7 +143,7 @@ class Specification:
                     f"specification {self.text!r}: at {place * self.dt:.6g} s a comparison is of no number (NaN)"
                 )
             traces[name] = found
-        return self.formula.known(traces)
+        return traces
 
     def __str__(self) -> str:
         return self.text

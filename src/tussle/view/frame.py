@@ -51,10 +51,10 @@ class Event:
 
     Attributes:
         t: Time at the beginning of its step; of a birth or an end, its own time [s].
-        kind: "birth", "death", "capture", "collision", "flag" or "end".
+        kind: "birth", "death", "capture", "collision", "flag" or "end"; of a specification "alarm" or "failure".
         id: Entity that was born, died, captured or has a flag; the smaller id in a collision; 0 for an end.
         other: Entity that was captured, that captured or hit the dead one, or the larger id in a collision; 0 for none.
-        text: Block of a birth, "ground" for a collision with it, cause of a death or an end, what happened to a flag.
+        text: The specification; block of a birth, "ground" for a collision with it, cause of a death or an end, what happened to a flag.
     """
 
     t: float

@@ -18,6 +18,7 @@ from tussle.engine.step_end import world_result
 from tussle.errors import ParameterError, PluginError, nearest_name
 from tussle.pacing import Pace
 from tussle.record.inputs import ExternalInput
+from tussle.view.alarms import SpecificationAlarms, SpecificationMonitor, SpecificationState
 from tussle.view.curves import GameCurves
 from tussle.view.drawn import DrawCollector, Shape
 from tussle.view.entity import EntityState, entity_state
@@ -30,7 +31,7 @@ from tussle.view.pacing import checked_warp, faster, slower
 from tussle.view.playback import Order, PlaybackController
 from tussle.view.player import Injection, Player, Setting
 from tussle.view.scenery import Scenery, scenery_of
-from tussle.view.series import CurveName
+from tussle.view.series import CurveName, StepSeries
 from tussle.view.sight import fields_of_view
 from tussle.view.style import Style
 
@@ -69,6 +70,8 @@ class Live:
         inputs: What came from outside in a recorded run of the game, see `tussle.record.load_inputs`; it comes again, until a message
             or a reset takes the game on another course.
         link: Over which messages, orders, sticks and settings come to the game; by default they come before the next step.
+        specifications: Monitors of the simulation, made before its first step, see `tussle.stress.Monitor`.
+        margin: Distance from failure below which there is an alarm, in the SI unit of what a specification compares.
 
     Raises:
         ParameterError: A value is not allowed.
@@ -88,9 +91,12 @@ class Live:
         viewer: Mapping[str, Any] | None = None,
         inputs: Sequence[ExternalInput] = (),
         link: OperatorLink | None = None,
+        specifications: Sequence[SpecificationMonitor] = (),
+        margin: float = 1.0,
     ) -> None:
         check_argument("snapshot_every", snapshot_every, POSITIVE)
         check_argument("memory", memory, POSITIVE)
+        check_argument("margin", margin, POSITIVE)
         if not 0 <= world < simulation.n_worlds:
             raise ParameterError(
                 f"world = {world!r} is not allowed; there are worlds 0 to {simulation.n_worlds - 1}"
@@ -99,7 +105,8 @@ class Live:
         self._clock = simulation.state.context.clock
         self._collector = DrawCollector(simulation, world)
         self._pace = Pace(checked_warp(pace))
-        self._player = Player(simulation, world, snapshot_every, 1e6 * memory, inputs, link)
+        alarms = SpecificationAlarms(specifications, margin, world, self.time_of)
+        self._player = Player(simulation, world, snapshot_every, 1e6 * memory, alarms, inputs, link)
         self._playback = PlaybackController(self._player, self._pace, self._collector, is_paused, self._renew)
         ring = self._playback.ring
         self._frame: LatestValue[Frame] = LatestValue(
@@ -109,6 +116,9 @@ class Live:
         self._result: LatestValue[WorldResult | None] = LatestValue(self._make_result, RESULT_PERIOD, ring)
         self._feed = MessageFeed(simulation, world)
         self._messages: LatestValue[list[TopicTraffic]] = LatestValue(self._feed.read, STATE_PERIOD, ring)
+        self._alarms: LatestValue[list[SpecificationState]] = LatestValue(
+            self._make_alarms, STATE_PERIOD, ring
+        )
         self._entities: dict[int, LatestValue[EntityState | None]] = {}
         self._renew(True)
         self._thread: threading.Thread | None = None
@@ -392,8 +402,13 @@ class Live:
 
     @property
     def events(self) -> list[Event]:
-        """Events in order; after rewinding, also those after the present."""
-        return list(self._player.events)
+        """Events in order, with alarms; after rewinding, also those after the present."""
+        alarms = self._player.alarms.events
+        return (
+            sorted([*self._player.events, *alarms], key=lambda e: e.t)
+            if alarms
+            else list(self._player.events)
+        )
 
     @property
     def injections(self) -> list[Injection | Setting]:
@@ -436,6 +451,21 @@ class Live:
         """What plugins publish, by topic. Listened to only while requested: nothing at the first request."""
         return self._taken(self._messages) or []
 
+    def alarms(self) -> list[SpecificationState]:
+        """How far the game is from breaking each specification. Alarms are looked for only while it is requested, in all steps so far."""
+        return self._taken(self._alarms) or []
+
+    @property
+    def robustness(self) -> dict[CurveName, StepSeries]:
+        """Robustness of the specifications at each step, up to the last request of `alarms`."""
+        return self._player.alarms.series
+
+    def _make_alarms(self) -> list[SpecificationState]:
+        player = self._player
+        if player.is_broken:
+            return self._alarms.value or []
+        return player.alarms.read(player.step, player.is_over)
+
     def result(self) -> WorldResult | None:
         """The provisional result, without state hash until the game ends; None at the first request."""
         return self._taken(self._result)  # type: ignore[no-any-return]
@@ -464,6 +494,7 @@ class Live:
             self._result,
             self._shapes,
             self._messages,
+            self._alarms,
             *list(self._entities.values()),
         ]
         for latest in values:

@@ -15,6 +15,7 @@ from tussle.engine.manual import axes_of
 from tussle.engine.simulation import Simulation
 from tussle.errors import ParameterError, PluginError, TussleError
 from tussle.record import Events
+from tussle.view.alarms import SpecificationAlarms
 from tussle.view.curves import GameCurves
 from tussle.view.frame import Event, frame_of
 from tussle.view.link import OperatorLink, Underway
@@ -81,6 +82,7 @@ class Player:
         world: Number of the world that is shown; the game ends with it.
         every: Least simulated time between snapshots [s].
         limit: Memory for snapshots and for frames [B], half of it for each.
+        alarms: Specifications that are watched.
         inputs: What came from outside in a recorded run of the game; it comes again until a message takes the game on another course.
         link: Between the people who give orders and the game; by default they come at once.
 
@@ -101,10 +103,11 @@ class Player:
         world: int,
         every: float,
         limit: float,
+        alarms: SpecificationAlarms,
         inputs: Sequence[ExternalInput] = (),
         link: OperatorLink | None = None,
     ) -> None:
-        self.simulation, self.world = simulation, world
+        self.simulation, self.world, self.alarms = simulation, world, alarms
         self._underway = Underway(link or OperatorLink(), float(simulation.state.context.clock.dt))
         self.timeline = Timeline(simulation, world, every, 0.5 * limit)
         self.history = History(simulation, world, 0.5 * limit)
@@ -219,6 +222,7 @@ class Player:
         self.events.clear()
         self.history.clear()
         self.curves.clear()
+        self.alarms.clear()
         self.step = self.first_step = step
 
     def rest(self, seconds: float) -> None:
@@ -356,7 +360,7 @@ class Player:
             )
         if step < self._furthest_step:
             self._end_recordings()
-            for part in (self.timeline, self.history, self.curves):
+            for part in (self.timeline, self.history, self.curves, self.alarms):
                 part.forget_after(step)
             self.injections[:] = [given for given in self.injections if given.step <= step]
             self._forget_events(step)
@@ -384,7 +388,7 @@ class Player:
     def reset(self, seed: int | None) -> None:
         """Restart the world, with another seed if one is given."""
         self._end_recordings()
-        for part in (self.timeline, self.history, self.curves):
+        for part in (self.timeline, self.history, self.curves, self.alarms):
             part.clear()
         self.injections.clear()
         self._underway = Underway(self._underway.link, float(self.simulation.state.context.clock.dt))

@@ -96,7 +96,10 @@ def test_a_game_is_served_steered_and_ended_with_its_summary(watching, folder):
 
 def test_what_is_watched_has_the_hash_that_it_has_alone(tussle):
     alone = re.search(r"hash\s+(\w{32})", tussle("run", "game.xml", "--no-log").stdout)[1]
-    seen = tussle("view", "game.xml", "--no-browser", "--exit-when-over", "--pace", "max", "--roles").stdout
+    specs = ("--spec", "always (distance(team 1, team 2) > 3 m)", "--spec", "lost[1] < 3", "--margin", "4")
+    seen = tussle(
+        "view", "game.xml", "--no-browser", "--exit-when-over", "--pace", "max", "--roles", *specs
+    ).stdout
     assert f"hash   {alone}" in seen
     assert re.findall(rf"^ (\w.*): {ADDRESS.pattern}$", seen, re.MULTILINE) == [
         "operate team 1",
@@ -113,6 +116,22 @@ def test_a_failing_plugin_is_the_exit_code(tussle, folder):
     )  # fmt: skip
     assert "Broken" in done.stderr
     assert "no" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("options", "message", "code"),
+    [
+        (("--spec", "always (distance(prey, hunters) > 3 s)"), "m and s cannot be compared", 1),
+        (("--spec", "scores[1] > 3"), "there is no 'scores", 1),
+        (("--spec", "always (nothing(prey) > 3)"), "there is no signal 'nothing'", 1),
+        (("--margin", "2"), "--margin is allowed with --spec only", 2),
+        (("--spec", "lost[1] < 3", "--margin", "0"), "it takes a number > 0", 2),
+    ],
+)
+def test_a_specification_that_the_mission_does_not_have_is_refused(tussle, options, message, code):
+    done = tussle("view", "game.xml", "--no-browser", *options, code=code)
+    assert message in " ".join(done.stderr.split())
+    assert "http" not in done.stdout
 
 
 def test_other_hosts_are_warned_of(watching):

@@ -253,27 +253,34 @@ class FramePublisher:
             "entity": self._entity(reader), "refusal": refusal, "steers": self._may_steer(reader),
             "role": {"kind": reader.role.kind, "team": reader.role.team},
             "feed": feed_rows(live.messages()) if reader.has_feed else None,
+            "alarms": [
+                {k: None if isinstance(v, float) and not math.isfinite(v) else v for k, v in asdict(each).items()}
+                for each in live.alarms()
+            ],
         }  # fmt: skip
 
     def _new_events(self, reader: Reader) -> dict[str, Any]:
         """Return the events that a browser does not have yet, and how many of the earlier ones are still valid."""
         events, sent = self._live.events, reader.events_sent
         n = len(sent)
-        if n > len(events) or (n and events[n - 1] is not sent[-1]):
-            n = 0
+        if events[:n] != sent:  # an alarm is older than what came after it, for example
+            pairs = enumerate(zip(events, sent, strict=False))
+            n = next((i for i, (one, other) in pairs if one != other), min(len(events), n))
         new = events[n : n + MAX_EVENTS]
         reader.events_sent = events[: n + len(new)]
         return {"from": n, "rows": event_rows(new)}
 
     def _new_curves(self, reader: Reader) -> dict[str, Any] | None:
         """Return the changes that a browser does not have yet, of the quantities that it wants, and the names of all results."""
-        series = dict(self._live.curves.series)
+        robustness = self._live.robustness
+        series = self._live.curves.series | robustness
         results = sorted({q.name for q in series if not q.id and q.name not in OF_TEAMS})
         has_names = results != reader.results_sent
         reader.results_sent = results
         changes: list[Changes] = []
         for quantity, each in series.items():
-            if quantity.name not in OF_TEAMS and (quantity.name, quantity.id) not in reader.wanted:
+            is_shown = quantity.name in OF_TEAMS or quantity in robustness
+            if not is_shown and (quantity.name, quantity.id) not in reader.wanted:
                 continue
             sent, n_sent = reader.changes_sent.get(quantity, (None, 0))
             start, end = n_sent if sent is each else 0, len(each.values)

@@ -2,6 +2,9 @@
 
 /** Sentences of each kind of event. @type {Record<string, string[]>} */
 export const EVENT_TEXTS = {
+  "alarm": [
+    "near failure: {text}"
+  ],
   "birth": [
     "{id} was born"
   ],
@@ -21,6 +24,9 @@ export const EVENT_TEXTS = {
   ],
   "difference": [
     "the two runs differ from here on"
+  ],
+  "failure": [
+    "failed: {text}"
   ],
   "flag": [
     "{id} {text}"

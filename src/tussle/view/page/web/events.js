@@ -8,7 +8,7 @@ import { lastWhere } from './ordered.js';
 import { Clock } from './timeline.js';
 
 /** Colours that are told apart with every kind of colour vision; the shapes tell them apart as well. @type {Record<string, string>} */
-export const KINDS = { capture: '#e8743b', collision: '#d9ae1f', flag: '#4aa3df', birth: '#2fb38a', death: '#b59ad6', end: '#93a1b0', difference: '#e05a9c' };
+export const KINDS = { capture: '#e8743b', collision: '#d9ae1f', flag: '#4aa3df', birth: '#2fb38a', death: '#b59ad6', alarm: '#f0c04a', failure: '#e5534b', end: '#93a1b0', difference: '#e05a9c' };
 /** Births and deaths are marked below a line, all others above it. */
 const BELOW = ['birth', 'death'];
 /** Pixels within which a mark is pointed at, and half the knob of the slider. */
@@ -120,6 +120,7 @@ function markOf(kind, x, size) {
   if (kind === 'birth') return new Path2D(`M${x} 20L${x + 3.6} ${bottom}L${x - 3.6} ${bottom}Z`);
   if (kind === 'death') return new Path2D(`M${x - 3.6} 20L${x + 3.6} 20L${x} ${bottom}Z`);
   const path = new Path2D();
+  if (kind === 'alarm' || kind === 'failure') return new Path2D(`M${x - 4} 4H${x + 4}L${x + 1.2} 24H${x - 1.2}Z`);
   if (kind === 'end' || kind === 'difference') {
     path.rect(x - 1, 4, 2, 22);
   } else {

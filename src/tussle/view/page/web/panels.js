@@ -1,5 +1,5 @@
 // The cards on the page: title, teams, scores, the chosen entity, what is known of the run.
-/** @import { Mode, PageData, Status, Team } from './types' */
+/** @import { Colour, Mode, PageData, Status, Team } from './types' */
 
 import { amount, byId, cleared, element, fillList, length, number, rgb, say, styled } from './formatting.js';
 import { between, forward, minus, norm } from './geometry.js';
@@ -164,7 +164,7 @@ export class Panels {
 
   /**
    * Draw a curve over the whole game, and in colour up to now.
-   * @param {HTMLCanvasElement} canvas @param {Series} series @param {number[]} range @param {number} t @param {Team} team
+   * @param {HTMLCanvasElement} canvas @param {Series} series @param {number[]} range @param {number} t @param {{ colour: Colour }} team
    */
   drawCurve(canvas, series, [lowest, highest], t, team) {
     const { start, end } = this.layer;

@@ -13,6 +13,7 @@ import { EventLine } from './events.js';
 import { LiveClock, RecordedClock } from './timeline.js';
 import { Panels } from './panels.js';
 import { MessagePanel } from './feed.js';
+import { AlarmPanel } from './alarms.js';
 import { Drive } from './drive.js';
 import { OrderForm } from './orders.js';
 import { QuantityPanel } from './quantities.js';
@@ -93,6 +94,7 @@ export class Player {
     this.orders = new OrderForm(this);
     this.drive = new Drive(this);
     this.feed = new MessagePanel(this);
+    this.alarms = new AlarmPanel(this);
     this.quantities = new QuantityPanel(this);
     this.steering = new Steering(this.canvas, this);
     drawn.labels = layer.mostAtOnce <= FEW.labels;
@@ -264,6 +266,7 @@ export class Player {
     this.orders.show();
     this.drive.show();
     this.feed.show();
+    this.alarms.show();
     this.quantities.show(clock.t);
     this.events.update(clock.t);
     clock.show(clock.t, clock.isPlaying, clock.speed);
@@ -374,8 +377,13 @@ export class Player {
   /** @param {GameEvent} event */
   jump(event) {
     this.clock.seek(event.t);
-    this.say(`${event.t.toFixed(this.clock.decimals)} s: ${eventText(event, (id) => this.layer.who(id))}`);
+    this.tell(event);
     this.look();
+  }
+
+  /** Say what happened, and when. @param {GameEvent} event */
+  tell(event) {
+    this.say(`${event.t.toFixed(this.clock.decimals)} s: ${eventText(event, (id) => this.layer.who(id))}`);
   }
 }
 

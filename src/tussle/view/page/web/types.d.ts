@@ -47,7 +47,14 @@ export interface Status {
   events: { from: number; rows: EventRow[] }; refusal: string | null; steers: boolean; role: { kind: 'direct' | 'operate' | 'watch'; team: number | null };
   /** Topic, messages a second of the game, and the last message; null where it was not asked for. */
   feed: [string, number, string][] | null;
+  alarms: SpecificationState[];
   entity: { id: number; sections: Section[]; quantities: [string, string][]; orders: OrderKind[]; axes: Record<string, string[]>; isDriven: boolean } | null;
+}
+
+/** How far a game is from breaking a specification, see alarms.py; null where a number is not known. */
+export interface SpecificationState {
+  text: string; unit: string; state: 'holds' | 'near' | 'failed' | 'open' | 'unknown'; now: number | null; ended: number | null; least: number | null; reached: number | null;
+  since: number | null; note: string;
 }
 
 /** A field of an order: components by name, or a single value; their units. */
