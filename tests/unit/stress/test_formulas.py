@@ -121,6 +121,22 @@ def test_what_is_known_of_a_game_holds_however_it_goes_on(formula, n, data):
         assert formula.robustness(other) <= known[k]
 
 
+@settings(max_examples=200)
+@given(FORMULAS, st.integers(2, 12), st.data())
+def test_what_is_known_while_a_game_goes_on_does_not_change_later(formula, n, data):
+    """Neither does the robustness of a sample alone, which does not depend on any other; under `always`, the least is the robustness."""
+    traces = signals(n, data)
+    k = data.draw(st.integers(0, n - 2))
+    so_far = {name: np.append(values[: k + 1], values[k]) for name, values in traces.items()}
+    assert formula.known(so_far)[k] == formula.known(traces)[k]
+    present = formula.present(traces)
+    others = {name: np.where(np.arange(n) == k, v, signals(n, data)[name]) for name, v in traces.items()}
+    assert np.array_equal(formula.present(others)[k], present[k], equal_nan=True)
+    assert np.array_equal(formula.present(so_far)[k], present[k], equal_nan=True)
+    if formula.delay == 0:
+        assert Window(formula).robustness(traces) == Window(formula).present(traces).min()
+
+
 @settings(max_examples=100)
 @given(FORMULAS, st.integers(1, 9), st.data())
 def test_the_opposite_has_the_negative_robustness(formula, n, data):

@@ -13,6 +13,7 @@ from tussle.messages import CustomKeyPress
 from tussle.mission import read_mission
 from tussle.stress import Monitor, Specification
 from tussle.view import Live
+from tussle.view.page.document import event_rows
 from tussle.view.page.server import Page
 from tussle.view.series import CurveName
 
@@ -193,6 +194,8 @@ def test_numbers_of_the_page_and_the_recording_are_not_changed_by_it(tmp_path):
         assert math.isfinite(at_end["ended"])
         client.wait(lambda: (NEAR, None, 0) in client.curves)
         client.wait(lambda: ["alarm", 0, 0, NEAR] in [row[1:] for row in client.events])
+        live.step(60)
+        client.wait(lambda: client.status["step"] == 180 and client.events == event_rows(live.events))
         assert page.error is None
 
 

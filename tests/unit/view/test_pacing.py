@@ -182,3 +182,16 @@ def test_an_offer_is_made_while_asked_for_and_no_oftener_than_its_period(clock):
     offer.take()
     offer.renew(402, is_still=True)  # nothing else will come: no need to wait for the period
     assert len(made) == n + 2
+
+
+def test_an_offer_that_takes_long_leaves_the_game_most_of_the_time(clock):
+    def make():
+        clock.now += 1.0
+
+    offer = LatestValue(make, 0.1, lambda: None)
+    began = clock.now
+    for version in range(4000):
+        clock.now += 0.01
+        offer.take()
+        offer.renew(version)
+    assert 3 <= offer.n_made <= 0.25 * (clock.now - began) + 1
