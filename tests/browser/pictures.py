@@ -21,6 +21,7 @@ from tussle import Block, Mission, Recorder, Simulation
 from tussle.api import Autonomy, Output
 from tussle.mission import read_mission
 from tussle.stock import SingleIntegrator
+from tussle.stress import Monitor, Specification
 from tussle.view import Live, Recording
 from tussle.view.export.html import write_html
 from tussle.view.page.compare import Comparison
@@ -68,6 +69,19 @@ def chase(browser: Browser) -> None:
         watched.press("o")
         watched.wait("player.status.entity")
         shoot(watched, "view-chase")
+
+
+def alarms(browser: Browser) -> None:
+    """A specification that has failed, and one that was near failure."""
+    loaded = read_mission(GAME)
+    texts = "always (distance(team 1, team 1) > 2 m)", "always (count(team 1) > 95)"
+    with Simulation(loaded.mission, 1) as simulation:
+        monitors = [Monitor(Specification.parse(text, loaded.mission), simulation) for text in texts]
+        live = Live(simulation, is_paused=True, viewer=loaded.viewer, specifications=monitors, margin=4.0)
+        with live, shown(browser, Page(live), {"width": 1100, "height": 700}) as watched:
+            live.step(900)
+            watched.wait("player.frame === 900")
+            shoot(watched, "view-alarms")
 
 
 def recorded(folder: Path, *speeds: str, n: int = 30, seconds: float = 40.0) -> list[Recording]:
@@ -248,6 +262,7 @@ HILLS = """<runscript name="Crates on hills"><run dt="0.1" end="60"/>
 
 PICTURES: dict[str, Callable[[Browser], None]] = {
     "chase": chase,
+    "alarms": alarms,
     "two-runs": two_runs,
     "replay": replay,
     "narrow": narrow,
