@@ -28,10 +28,10 @@ prey = Block(
 
 def hunters(name: str, team: int, north: float, switching: bool) -> Block:
     """Five predators 2 km East of the prey, flying West."""
-    place = {"position": (2000, north, 200), "placement": "uniform", "half_width": (500, 500, 100)}
     predator = Predator(max_speed=35, allow_prey_switching=switching)
     motion = Unicycle(vel_max=35, turn_rate_max=2, pitch_rate_max=1.5)
-    return Block(name=name, team=team, count=5, **place, heading="180 deg", autonomy=predator, motion=motion)
+    far = prey.replace(name=name, team=team, count=5, position=(2000, north, 200), half_width=(500, 500, 100))
+    return far.replace(heading="180 deg", autonomy=predator, motion=motion)
 
 
 mission = Mission(

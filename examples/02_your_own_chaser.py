@@ -5,6 +5,7 @@ Stock predators all follow the nearest prey and soon fly on top of each other. Y
 
 import math
 import sys
+from typing import Any
 
 from tussle import Block, Mission, Simulation
 from tussle.api import EasyAutonomy, EntityRef, Output, Param, Publish, wrap
@@ -24,7 +25,7 @@ class SharingChaser(EasyAutonomy):
     pitch_rate = Output(unit="rad/s")
     capture = Publish(CaptureEntity)
 
-    def step_one(self, me):
+    def step_one(self, me: Any) -> None:
         if me.target is None:
             prey = me.near(3000.0, team=me.prey_team)  # nearest first
             if not prey:
@@ -38,7 +39,7 @@ class SharingChaser(EasyAutonomy):
             me.publish("capture", target=me.target)
 
 
-PLACE = {"placement": "uniform", "half_width": (300, 300, 100)}
+PLACE: dict[str, Any] = {"placement": "uniform", "half_width": (300, 300, 100)}
 BODY = Unicycle(vel_max=35, turn_rate_max=2, pitch_rate_max=1.5)
 YOURS, STOCK = SharingChaser(), Predator(max_speed=35, allow_prey_switching=False)
 MISSION = Mission(

@@ -5,7 +5,7 @@ import time
 import numpy as np
 
 from tussle import Block, Mission, Simulation
-from tussle.api import Autonomy, Output, Param, unit
+from tussle.api import Autonomy, GroupView, Output, Param, unit
 from tussle.stock import SingleIntegrator
 
 
@@ -17,7 +17,7 @@ class Flock(Autonomy):
     max_speed = Param(15.0, unit="m/s", ge=0.0)
     velocity = Output("velocity_x velocity_y velocity_z", unit="m/s")
 
-    def step(self, g):
+    def step(self, g: GroupView) -> None:
         near = g.near(self.sight, teams="own")  # pairs of a robot and a neighbour
         push = np.maximum(0.0, 1.0 - near.distance / self.space[near.row]) / near.distance
         separation = near.sum(-push * near.offset)  # (3, n), like all vectors
@@ -32,8 +32,14 @@ def order(simulation: Simulation) -> float:
     return float(np.linalg.norm(velocity.mean(axis=1)) / 15.0)
 
 
-place = {"variance": (4e4, 4e4, 0), "scatter_first": True}
-flock = Block(name="flock", count=1000, **place, autonomy=Flock(), motion=SingleIntegrator())
+flock = Block(
+    name="flock",
+    count=1000,
+    variance=(4e4, 4e4, 0),
+    scatter_first=True,
+    autonomy=Flock(),
+    motion=SingleIntegrator(),
+)
 simulation = Simulation(Mission(blocks=[flock], end=40), seeds=1)
 simulation.step()
 began = time.process_time()

@@ -5,14 +5,26 @@ import numpy as np
 from tussle import Block, Mission, Simulation
 from tussle.stock import Boids, Predator, SimpleCapture, SimpleCaptureMetrics, Unicycle
 
-flock = {"variance": (2e4, 2e4, 0), "autonomy": Boids(), "motion": Unicycle(vel_max=30)}
-pack = {"position": (1000, 0, 0), "variance": (1e5, 1e5, 0), "heading": "180 deg"}
-agile = {"autonomy": Predator(max_speed=35), "motion": Unicycle(vel_max=35, pitch_rate_max=1.5)}
+prey = Block(
+    name="prey",
+    team=1,
+    count=50,
+    variance=(2e4, 2e4, 0),
+    autonomy=Boids(),
+    motion=Unicycle(vel_max=30),
+)
+hunters = Block(
+    name="hunters",
+    team=2,
+    count=5,
+    position=(1000, 0, 0),
+    variance=(1e5, 1e5, 0),
+    heading="180 deg",
+    autonomy=Predator(max_speed=35),
+    motion=Unicycle(vel_max=35, pitch_rate_max=1.5),
+)
 mission = Mission(
-    blocks=[
-        Block(name="prey", team=1, count=50, **flock),
-        Block(name="hunters", team=2, count=5, **pack, **agile),
-    ],
+    blocks=[prey, hunters],
     end=120,
     interactions=[SimpleCapture()],
     metrics=[SimpleCaptureMetrics()],

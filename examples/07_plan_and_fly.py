@@ -2,11 +2,12 @@
 
 import math
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 
 from tussle import Block, Mission, Simulation
-from tussle.api import Autonomy, Handle, Output, Param
+from tussle.api import Autonomy, GroupView, Handle, Output, Param
 from tussle.plan import Problem, solve
 from tussle.scene import Cuboid, Scene
 from tussle.stock import Unicycle
@@ -26,13 +27,13 @@ class PlanAndDrive(Autonomy):
     command = Output("speed turn_rate velocity_z", unit="m/s rad/s m/s")
     mind = Handle(doc="The plan, the next step in it, and how many walls it knows.")
 
-    def open_one(self, row):
+    def open_one(self, row: int) -> SimpleNamespace:
         return SimpleNamespace(plan=None, at=0, n_known=-1)
 
-    def step(self, g):
+    def step(self, g: GroupView) -> None:
         for row, mind in enumerate(self.mind):
             pos = g.pos[:, row]
-            walls = [wall for wall in g.scene.walls if wall.center[0] - pos[0] < self.sight[row]]
+            walls = [wall for wall in WALLS if wall.center[0] - pos[0] < self.sight[row]]
             if len(walls) > mind.n_known or mind.at == len(mind.plan.inputs):
                 start = {"x": pos[0], "y": pos[1], "yaw": g.yaw[row]}
                 mind.plan, mind.at, mind.n_known = solve(problem(start, walls), seed=1), 0, len(walls)
@@ -42,7 +43,7 @@ class PlanAndDrive(Autonomy):
             mind.at += 1
 
 
-def problem(start, walls):
+def problem(start: dict[str, Any], walls: list[Cuboid]) -> Problem:
     """The way from a state to the goal around some walls."""
     commands = {"speed": (2.0, 5.0), "turn_rate": (-1.0, 1.0)}
     bounds = {"x": (0, 100), "y": (0, 100), "yaw": (-math.tau, math.tau)}

@@ -3,6 +3,7 @@
 import asyncio
 import json
 import sys
+from typing import Any
 
 import aiohttp
 
@@ -11,9 +12,9 @@ async def main(url: str) -> None:
     """Play 30 s and print how many prey are left."""
     async with aiohttp.ClientSession() as session, session.ws_connect(url, max_msg_size=0) as socket:
 
-        async def ask(command: str, **fields: object) -> dict:
+        async def ask(command: str, **fields: object) -> dict[str, Any]:
             await socket.send_json({"do": command, **fields})
-            answer = json.loads((await socket.receive()).data)
+            answer: dict[str, Any] = json.loads((await socket.receive()).data)
             if "error" in answer:
                 raise SystemExit(answer["error"])
             return answer

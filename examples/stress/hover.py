@@ -1,6 +1,6 @@
 """A drone that holds its place in gusts."""
 
-from tussle.api import Autonomy, Output, Param
+from tussle.api import Autonomy, GroupView, Output, Param
 
 
 class Hover(Autonomy):
@@ -12,5 +12,5 @@ class Hover(Autonomy):
     gust = Param(3.0, unit="m/s", ge=0.0, doc="Standard deviation of the wind's speed, drawn in each step.")
     velocity = Output("velocity_x velocity_y velocity_z", unit="m/s")
 
-    def step(self, g):
+    def step(self, g: GroupView) -> None:
         self.velocity[:] = self.gain * (self.place - g.pos) + self.gust * g.normal("gust", 3)

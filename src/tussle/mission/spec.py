@@ -20,6 +20,7 @@ from tussle.mission import displayed
 from tussle.mission.cadence import Cadence
 from tussle.mission.laws import check_compat, with_laws
 from tussle.mission.limits import Limits
+from tussle.mission.quantities import Quantities, QuantitiesOrNone, Quantity, QuantityOrNone, given
 from tussle.mission.rekeys import checked_rekeys
 from tussle.plugins import stock
 from tussle.world.scene import Scene, find_region
@@ -180,25 +181,25 @@ class Block:
     name: str
     team: int = 0
     count: int = 1
-    position: Sequence[float] = (0.0, 0.0, 0.0)
-    variance: Sequence[float] = (100.0, 100.0, 0.0)
-    half_width: Sequence[float] = (0.0, 0.0, 0.0)
+    position: Quantities = given((0.0, 0.0, 0.0))
+    variance: Quantities = given((100.0, 100.0, 0.0))
+    half_width: Quantities = given((0.0, 0.0, 0.0))
     placement: str = "normal"
     scatter_first: bool = False
-    heading: float = 0.0
-    heading_variance: float = 0.0
-    climb: float = 0.0
-    roll: float = 0.0
-    velocity: Sequence[float] | None = None
-    speed: float = 0.0
+    heading: Quantity = given(0.0)
+    heading_variance: Quantity = given(0.0)
+    climb: Quantity = given(0.0)
+    roll: Quantity = given(0.0)
+    velocity: QuantitiesOrNone = given(None)
+    speed: Quantity = given(0.0)
     health: float = 1.0
-    radius: float = 1.0
-    mass: float = 1.0
-    box: Sequence[float] | None = None
-    rate: float | None = None
+    radius: Quantity = given(1.0)
+    mass: Quantity = given(1.0)
+    box: QuantitiesOrNone = given(None)
+    rate: QuantityOrNone = given(None)
     slots: int = 1
-    first_birth: float = 0.0
-    interval_sd: float = 0.0
+    first_birth: Quantity = given(0.0)
+    interval_sd: Quantity = given(0.0)
     without_space: str = "wait"
     autonomy: Any = ()
     controller: Any = ()
@@ -306,9 +307,9 @@ class Mission:
     """
 
     blocks: Sequence[Block]
-    dt: float = 0.1
-    end: float = 50.0
-    start: float = 0.0
+    dt: Quantity = given(0.1)
+    end: Quantity = given(50.0)
+    start: Quantity = given(0.0)
     motion_multiplier: int = 1
     update: str = "synchronous"
     end_conditions: Any = ("time",)
@@ -318,7 +319,7 @@ class Mission:
     scene: Scene = field(default_factory=Scene)
     name: str = ""
     compat: str = ""
-    reseed_time: float | None = None
+    reseed_time: QuantityOrNone = given(None)
     reseed: int | None = None
     rekeys: Any = ()
     limits: Limits = field(default=Limits(), repr=False)  # no effect on the game

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import re
 import subprocess
 import sys
@@ -42,6 +43,19 @@ def test_each_begins_with_a_plugin_that_plays_and_a_test_that_passes(tussle, fol
     )  # fmt: skip
     assert tests.returncode == 0, tests.stdout
     assert f"{2 * len(PLUGINS)} passed" in tests.stdout
+
+
+@pytest.mark.parametrize(("prefix", "kind", "options"), PLUGINS)
+def test_type_checkers_know_all_that_is_written(tmp_path, prefix, kind, options):
+    stock = options[1] if "--from" in options else None
+    for path in write_plugin(
+        kind, f"{prefix}{kind.capitalize()}", stock, tmp_path, is_easy="--easy" in options
+    )[0]:
+        for made in ast.walk(ast.parse(path.read_text())) if path.suffix == ".py" else ():
+            if isinstance(made, ast.FunctionDef):
+                named = [a for a in (*made.args.args, *made.args.kwonlyargs) if a.arg not in ("self", "cls")]
+                assert made.returns, f"{path.name}: {made.name}"
+                assert all(a.annotation for a in named), f"{path.name}: {made.name}"
 
 
 @pytest.mark.with_and_without  # ROS

@@ -37,11 +37,11 @@ from tussle.mission import read_mission
 HERE = Path(__file__).parent
 
 
-def test_conformance():
+def test_conformance() -> None:
     check_plugin({name})
 
 
-def test_mission_reaches_its_end_time():
+def test_mission_reaches_its_end_time() -> None:
     loaded = read_mission(HERE / "{module}.xml", plugin_files=[HERE / "{module}.py"])
     (result,) = Simulation(loaded.mission, seeds=1).run()
     assert result.end == "time"
