@@ -1,44 +1,32 @@
-"""Types of values that are given as numbers or as texts with a unit, and read as numbers in SI units.
-
-Type checkers take what an attribute is set to from `__set__`, and what is read from `__get__`; nothing of that exists when a program runs.
-"""
+"""Types of values that are given as numbers or as texts with a unit, and read as numbers in SI units."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any, Generic, TypeVar
 
-if TYPE_CHECKING:
+Read = TypeVar("Read")
+Write = TypeVar("Write")
 
-    class Quantity:
-        """A number, or a text such as "50 kt"."""
 
-        def __get__(self, owner: object, kind: object = None) -> float: ...
-        def __set__(self, owner: object, value: float | str) -> None: ...
+class Given(Generic[Read, Write]):
+    """An attribute that type checkers take as set to one type and read as another. When a program runs, it is a usual attribute."""
 
-    class QuantityOrNone:
-        """The same, or None."""
+    def __get__(self, owner: object, kind: object = None) -> Read:
+        raise AttributeError
 
-        def __get__(self, owner: object, kind: object = None) -> float | None: ...
-        def __set__(self, owner: object, value: float | str | None) -> None: ...
+    def __set__(self, owner: object, value: Write) -> None:
+        raise AttributeError
 
-    class Quantities:
-        """Numbers, or texts such as "2 km", or one text of numbers."""
 
-        def __get__(self, owner: object, kind: object = None) -> Sequence[float]: ...
-        def __set__(self, owner: object, value: Sequence[float | str]) -> None: ...
-
-    class QuantitiesOrNone:
-        """The same, or None."""
-
-        def __get__(self, owner: object, kind: object = None) -> Sequence[float] | None: ...
-        def __set__(self, owner: object, value: Sequence[float | str] | None) -> None: ...
-
-else:
-    Quantity, QuantityOrNone = float, float | None
-    Quantities, QuantitiesOrNone = Sequence[float], Sequence[float] | None
+Quantity = Given[float, float | str]
+"""A number, or a text such as "50 kt"."""
+QuantityOrNone = Given[float | None, float | str | None]
+Quantities = Given[Sequence[float], Sequence[float | str]]
+"""Numbers, or texts such as "2 km", or one text of numbers."""
+QuantitiesOrNone = Given[Sequence[float] | None, Sequence[float | str] | None]
 
 
 def given(default: Any) -> Any:
-    """The default of such a value."""
+    """The default of such an attribute."""
     return default

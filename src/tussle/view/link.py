@@ -13,6 +13,7 @@ import numpy as np
 from tussle.documents import Real, check_argument
 from tussle.errors import ParameterError, listed, nearest_name
 from tussle.numeric.rng import stream_key, uniform
+from tussle.record.run_file import plain
 
 LOSS = stream_key("operator", "link", "loss")
 RULES = {"delay": Real(0.0, 1e6), "loss": Real(0.0, 1.0), "bandwidth": Real(1e-3)}
@@ -79,11 +80,14 @@ class Underway:
     """
 
     def __init__(self, link: OperatorLink, dt: float) -> None:
-        self.link = link
-        self._dt = dt
+        self._link, self._dt = link, dt
         self._orders: list[tuple[int, Callable[[], None]]] = []
+        self.restart()
+
+    def restart(self) -> None:
+        """Begin anew, with the first order."""
+        self.clear()
         self._n_sent = 0
-        self._free_at = 0.0
 
     def clear(self) -> int:
         """Forget the orders that are on their way; return how many they were."""
@@ -95,18 +99,16 @@ class Underway:
         """Send an order before a step.
 
         Args:
-            order: What is sent, as JSON takes it; arrays as lists.
+            order: What is sent.
             step: The step.
             key: Key of the world's draws, (1,).
             do: Carries it out.
             is_sure: It is not lost.
         """
-        text = json.dumps(
-            order, default=lambda value: value.tolist() if hasattr(value, "tolist") else str(value)
-        )
-        self._free_at = max(step * self._dt, self._free_at) + len(text.encode()) / self.link.bandwidth
-        arrival = math.ceil(round((self._free_at + self.link.delay) / self._dt, 6))
-        is_lost = uniform(key, LOSS, self._n_sent, 0)[0, 0] < self.link.loss
+        n_bytes = len(json.dumps(plain(order)).encode())
+        self._free_at = max(step * self._dt, self._free_at) + n_bytes / self._link.bandwidth
+        arrival = math.ceil(round((self._free_at + self._link.delay) / self._dt, 6))
+        is_lost = uniform(key, LOSS, self._n_sent, 0)[0, 0] < self._link.loss
         self._n_sent += 1
         if is_sure or not is_lost:
             self._orders.append((max(arrival, step), do))

@@ -108,7 +108,8 @@ class Player:
         link: OperatorLink | None = None,
     ) -> None:
         self.simulation, self.world, self.alarms = simulation, world, alarms
-        self._underway = Underway(link or OperatorLink(), float(simulation.state.context.clock.dt))
+        dt = float(simulation.state.context.clock.dt)
+        self._underway = None if link is None else Underway(link, dt)
         self.timeline = Timeline(simulation, world, every, 0.5 * limit)
         self.history = History(simulation, world, 0.5 * limit)
         self.injections: list[Injection | Setting] = []
@@ -172,17 +173,17 @@ class Player:
             order: What is sent, see `Underway.send`.
             do: Carries it out.
             is_sure: It is not lost.
-
-        Raises:
-            TussleError: It arrives at once, and cannot be carried out.
         """
-        self._underway.send(order, self.step, self.simulation.state.context.keys[[self.world]], do, is_sure)
-        for each in self._underway.take(self.step):
-            each()
+        if self._underway is None:
+            do()
+            return
+        key = self.simulation.state.context.keys[[self.world]]
+        self._underway.send(order, self.step, key, do, is_sure)
+        self._receive()
 
     def _receive(self) -> None:
         """Carry out the orders that arrive now."""
-        for do in self._underway.take(self.step):
+        for do in self._underway.take(self.step) if self._underway else ():
             try:
                 do()
             except TussleError as error:
@@ -245,14 +246,14 @@ class Player:
         step, here = max(step, self.first_step), self.step
         if step == here and not self.is_broken:
             return step
-        if n := self._underway.clear():
-            self.note(
-                f"{counted(n, 'order')} on the way did not arrive: the time jumped from step {here} to {step}"
-            )
         is_back = step < here or self.is_broken
         if is_back and self.timeline.refusal:
             self.note(f"the game cannot be rewound: {self.timeline.refusal}")
             return here
+        if self._underway and (n := self._underway.clear()):
+            self.note(
+                f"{counted(n, 'order')} on the way did not arrive: the time jumped from step {here} to {step}"
+            )
         if is_back and not self.is_broken and here >= self._furthest_step:
             self.timeline.keep(here)  # so that the present can be restored
         nearest = self.timeline.nearest(step)
@@ -391,7 +392,8 @@ class Player:
         for part in (self.timeline, self.history, self.curves, self.alarms):
             part.clear()
         self.injections.clear()
-        self._underway = Underway(self._underway.link, float(self.simulation.state.context.clock.dt))
+        if self._underway:
+            self._underway.restart()
         self._play_inputs(())
         self.events.clear()
         self.is_broken = False

@@ -20,6 +20,12 @@ class Go(Message):
     note = Handle(is_text=True)
 
 
+class Parcel(Message):
+    """Anything."""
+
+    content = Handle()
+
+
 class Obedient(Autonomy):
     """Does what it heard last, and counts what it has heard."""
 
@@ -142,6 +148,33 @@ def test_an_order_that_cannot_be_carried_out_when_it_comes_is_a_note():
         assert live.step_number == 12
         assert any("has no entity 2 now" in note for note in live.notes)
         assert live.error is None
+
+
+@pytest.mark.parametrize("link", [None, OperatorLink(delay=0.2, bandwidth=1e3)])
+def test_objects_that_cannot_be_written_down_are_sent_as_others(link):
+    with (
+        Simulation(mission(), 1) as simulation,
+        Live(simulation, threaded=False, is_paused=True, link=link) as live,
+    ):
+        live.publish(Parcel, content={(1, 2): {object()}})
+        live.step(10)
+        assert live.error is None
+        assert len(live.injections) == 1
+
+
+def test_where_the_time_does_not_jump_orders_arrive():
+    link = OperatorLink(delay=1.0)
+    with (
+        Simulation(mission(), 1) as simulation,
+        Live(simulation, threaded=False, is_paused=True, link=link) as live,
+    ):
+        live.step(5)
+        live.publish(Go, speed=1.0)
+        live.step(5)
+        live._player.timeline.refusal = "a plugin cannot be saved"
+        live.seek(0.0)
+        live.step(10)
+        assert [each.step for each in live.injections] == [15]
 
 
 @pytest.mark.parametrize(
