@@ -30,13 +30,10 @@ MAX_SUBSTEP = 2**16
 
 def stream_key(*names: str) -> int:
     """64-bit key of the stream with these names (block, plugin instance, label), the same in every process and version."""
-    digest = hashlib.blake2b(digest_size=8)
-    for name in names:
-        data = name.encode()
-        digest.update(
-            len(data).to_bytes(8, "little") + data
-        )  # lengths distinguish ("ab", "c") and ("a", "bc")
-    return int.from_bytes(digest.digest(), "little")
+    texts = [name.encode() for name in names]
+    # Lengths distinguish ("ab", "c") and ("a", "bc").
+    data = b"".join([len(text).to_bytes(8, "little") + text for text in texts])
+    return int.from_bytes(hashlib.blake2b(data, digest_size=8).digest(), "little")
 
 
 @device

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
+from bisect import bisect_left
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
@@ -63,7 +64,7 @@ class StressGame:
 
     def branch(self, step: int, key: int) -> StressGame:
         """The same game up to the state at the start of a step, and from there on with other luck."""
-        kept = tuple(change for change in self.rekeys if change[0] < step)
+        kept = self.rekeys[: bisect_left(self.rekeys, (step,))]
         return StressGame(self.seed, (*kept, (step, key)), self.values, self.mission)
 
 

@@ -92,8 +92,10 @@ def repetition(
             assert step is not None
             key = stream_key("stress", "branch", f"{first_seed} {number} {round_} {place}")
             branches.append(played[parent].game.branch(step, key))
-        for place, branch in zip(lost.tolist(), (yield branches), strict=True):
-            played[place], robustness[place] = branch, branch.verdict.robustness
+        found = yield branches
+        robustness[lost] = [branch.verdict.robustness for branch in found]
+        for place, branch in zip(lost.tolist(), found, strict=True):
+            played[place] = branch
         result.n_games += len(lost)
         round_ += 1
     result.failures = [p for p in played if p.verdict.has_failed]
