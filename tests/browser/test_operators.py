@@ -88,6 +88,7 @@ def test_a_game_of_three_operators_that_is_killed_is_played_again_bit_for_bit(ch
     path = operated(chromium, tmp_path)
     run, inputs = load_run(path), load_inputs(path)
     assert not run.is_complete
+    assert {each.by for each in inputs} == {"direct", "operate team 1", "operate team 2"}
     kinds = {each.name for each in inputs}
     assert {"Waypoint", "ManualControl", "SpawnEntity", "RemoveEntity"} <= kinds
     assert {"red.GoTo.speed", "blue.GoTo.speed"} <= kinds

@@ -35,7 +35,7 @@ from tussle.mission import GivenMission, Mission, mission_of
 from tussle.mission.rekeys import Rekeys
 from tussle.mission.spec import SHUFFLED
 from tussle.notebook_bar import notebook_bar
-from tussle.record.inputs import COLUMN, ExternalInput, fields_of, of_message
+from tussle.record.inputs import COLUMN, GIVER, ExternalInput, fields_of, given_by, of_message
 
 if TYPE_CHECKING:
     from tussle.record import FirstStates
@@ -329,8 +329,9 @@ class Simulation:
         return int(self.state.context.clock.step[world])
 
     def _tell(self, world: int, given: ExternalInput) -> None:
+        told = replace(given, by=GIVER.get())
         for listener in self.events.inputs:
-            listener(world, given)
+            listener(world, told)
 
     def play_inputs(self, inputs: Iterable[ExternalInput], world: int = 0) -> None:
         """Let what came from outside in another game come into a world again, each before its step, also after a reset or `restore`.
@@ -361,14 +362,15 @@ class Simulation:
             ParameterError: There is no such column or message, or its values do not fit.
             WiringError: There is no such network.
         """
-        if given.kind == COLUMN:
-            access.write(self.state, given.name, np.array(given.values), world)
-            if self._is_told:
-                self._tell(world, replace(given, step=self._step_of(world)))
-            return
-        type_ = self.state.message_bus.type_of(given.network, given.topic or given.name, given.name)
-        fields = fields_of(type_, given.values)
-        self.publish(type_, [world], network=given.network, topic=given.topic, receivers=given.to, **fields)
+        with given_by(given.by):
+            if given.kind == COLUMN:
+                access.write(self.state, given.name, np.array(given.values), world)
+                if self._is_told:
+                    self._tell(world, replace(given, step=self._step_of(world)))
+                return
+            type_ = self.state.message_bus.type_of(given.network, given.topic or given.name, given.name)
+            fields, to = fields_of(type_, given.values), given.to
+            self.publish(type_, [world], network=given.network, topic=given.topic, receivers=to, **fields)
 
     def _play_inputs(self) -> None:
         for world, by_step in self._inputs.items():

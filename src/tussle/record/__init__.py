@@ -12,7 +12,7 @@ from tussle.record.state_hash import hash_columns
 if TYPE_CHECKING:
     from tussle.record.first_states import FirstStates, read_table
     from tussle.record.input_table import load_inputs
-    from tussle.record.inputs import ExternalInput
+    from tussle.record.inputs import ExternalInput, given_by
     from tussle.record.recorder import Recorder
     from tussle.record.run import Run, load_run
 
@@ -22,6 +22,7 @@ __all__ = [
     "FirstStates",
     "Recorder",
     "Run",
+    "given_by",
     "hash_columns",
     "load_inputs",
     "load_run",
@@ -33,6 +34,7 @@ _LAZY = {
     "ExternalInput": "inputs",
     "Recorder": "recorder",
     "Run": "run",
+    "given_by": "inputs",
     "load_inputs": "input_table",
     "load_run": "run",
     "read_table": "first_states",

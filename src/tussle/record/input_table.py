@@ -48,7 +48,7 @@ def batch_of(inputs: Iterable[tuple[int, ExternalInput]], time_of: Callable[[int
         "t": [time_of(each.step) for _, each in rows],
         **{
             name: [getattr(each, name) for _, each in rows]
-            for name in ("step", "kind", "name", "network", "topic", "to")
+            for name in ("step", "kind", "name", "network", "topic", "to", "by")
         },
         "values": [None if each.values is None else json.dumps(each.values) for _, each in rows],
     }
@@ -71,6 +71,7 @@ def inputs_of(table: pa.Table, world: int) -> tuple[ExternalInput, ...]:
             row["network"],
             row["topic"],
             tuple(row.get("to") or ()),
+            row.get("by") or "",
         )
         for row in table.to_pylist()
         if row["world"] == world

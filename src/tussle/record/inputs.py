@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass
 from typing import Any
 
@@ -29,6 +31,7 @@ class ExternalInput:
         network: Network of the message; "" is the one that reaches everyone.
         topic: Topic of the message; "" is the name of the type.
         to: Ids of the entities that get the message; () is whoever the network reaches.
+        by: Who gave it, such as "operate team 1"; "" where nobody said so, see `given_by`.
     """
 
     step: int
@@ -38,6 +41,25 @@ class ExternalInput:
     network: str = ""
     topic: str = ""
     to: tuple[int, ...] = ()
+    by: str = ""
+
+
+GIVER: ContextVar[str] = ContextVar("GIVER", default="")
+"""Who gives what comes from outside now, in this thread."""
+
+
+@contextmanager
+def given_by(name: str) -> Generator[None]:
+    """Record what comes from outside within as given by somebody: messages that are published, and columns that are written.
+
+    Args:
+        name: Who gives it.
+    """
+    token = GIVER.set(name)
+    try:
+        yield
+    finally:
+        GIVER.reset(token)
 
 
 InputListener = Callable[[int, ExternalInput], None]

@@ -134,6 +134,7 @@ INPUTS = pa.schema(
             pa.list_(_I),
             metadata={"doc": "ids of the entities that got the message; none is whoever the network reached"},
         ),
+        pa.field("by", pa.string(), metadata={"doc": "who gave it; empty where nobody said so"}),
         pa.field(
             "values",
             pa.string(),

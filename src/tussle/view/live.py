@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import threading
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from contextvars import copy_context
 from functools import cached_property
 from typing import Any, Self
 
@@ -135,9 +136,10 @@ class Live:
             self._playback.drain()
 
     def _send(self, order: Any, do: Callable[[], None], is_sure: bool = False) -> None:
-        """Give an order that goes over the link, see `Player.send`."""
+        """Give an order that goes over the link, see `Player.send`, with the name of who gives it."""
         self._check_is_own()
-        self._give(lambda: self._player.send(order, do, is_sure))
+        context = copy_context()
+        self._give(lambda: self._player.send(order, lambda: context.run(do), is_sure))
 
     def _check_is_own(self) -> None:
         if self._is_followed:

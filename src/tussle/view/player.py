@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,6 +15,7 @@ from tussle.engine.manual import axes_of
 from tussle.engine.simulation import Simulation
 from tussle.errors import ParameterError, PluginError, TussleError
 from tussle.record import Events
+from tussle.record.inputs import GIVER, given_by
 from tussle.view.alarms import SpecificationAlarms
 from tussle.view.curves import GameCurves
 from tussle.view.frame import Event, frame_of
@@ -40,12 +41,14 @@ class Setting:
         path: Plugin and parameter, "GoTo.speed".
         value: The value, or those of its components.
         to: Ids of the entities.
+        by: Who set it.
     """
 
     step: int
     path: str
     value: Any
     to: tuple[int, ...]
+    by: str = field(default_factory=GIVER.get)
 
 
 @dataclass(frozen=True)
@@ -59,6 +62,7 @@ class Injection:
         topic: Its topic; "" is the type's name.
         fields: Field -> value.
         to: Ids of the entities that get it; () is whoever the network reaches.
+        by: Who gave it.
     """
 
     step: int
@@ -67,6 +71,7 @@ class Injection:
     topic: str = ""
     fields: dict[str, Any] = field(default_factory=dict)
     to: tuple[int, ...] = ()
+    by: str = field(default_factory=GIVER.get)
 
 
 class Player:
@@ -196,8 +201,9 @@ class Player:
         sim = self.simulation
         if isinstance(given, Setting):
             for written in setting_inputs(sim, self.world, given.path, given.value, given.to):
-                sim.play_input(written, self.world)
-        else:
+                sim.play_input(replace(written, by=given.by), self.world)
+            return
+        with given_by(given.by):
             sim.publish(
                 given.type,
                 [self.world],

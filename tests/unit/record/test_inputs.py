@@ -9,7 +9,7 @@ import pytest
 from tussle import Block, Mission, Recorder, Simulation, load_run
 from tussle.api import EasyAutonomy, Field, Handle, Interaction, Message, Output, Param, State, Subscribe
 from tussle.errors import ParameterError, RecordError
-from tussle.record import ExternalInput, load_inputs
+from tussle.record import ExternalInput, given_by, load_inputs
 from tussle.record.input_table import inputs_of
 from tussle.record.inputs import fields_of
 from tussle.record.schema import INPUTS
@@ -324,3 +324,27 @@ def test_an_operator_takes_over_a_recorded_game(tmp_path):
         sim.publish(Course, to=(0.0, 0.0, 0.0), speed=1.0, why="stay")
         sim.run()
         assert sim.state_hash() == other
+
+
+def test_who_gave_an_input_is_recorded_and_kept_when_it_comes_again(tmp_path):
+    with Simulation(mission(), 1) as sim, Recorder(sim, tmp_path / "first"):
+        with given_by("Ada"):
+            sim.publish(Course, speed=1.0, why="so")
+            with given_by("Ben"):
+                sim.write("Wind.strength", [3.0])
+            sim.publish(Course, speed=2.0, why="so")
+        sim.publish(Course, speed=3.0, why="so")
+        sim.step(3)
+    inputs = load_inputs(tmp_path / "first")
+    assert [each.by for each in inputs] == ["Ada", "Ben", "Ada", ""]
+    with Simulation(mission(), 1) as sim, Recorder(sim, tmp_path / "second"), given_by("who plays it"):
+        sim.play_inputs(inputs)
+        sim.step(3)
+    assert load_inputs(tmp_path / "second") == inputs
+
+
+def test_inputs_of_a_run_that_does_not_say_who_gave_them(tmp_path):
+    played(tmp_path / "run")
+    inputs = load_inputs(tmp_path / "run")
+    table = load_run(tmp_path / "run").inputs_table
+    assert inputs_of(table.drop_columns(["by"]), 0) == inputs

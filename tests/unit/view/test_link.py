@@ -1,12 +1,14 @@
 """Orders that come over a slow link that loses some."""
 
+import time
+
 import pytest
 
 from tussle import Block, Mission, Recorder, Simulation
 from tussle.api import Autonomy, Field, Handle, Message, Output, State, Subscribe
 from tussle.errors import ParameterError
 from tussle.messages import ManualControl
-from tussle.record import load_inputs
+from tussle.record import given_by, load_inputs
 from tussle.stock import SingleIntegrator
 from tussle.view import Live, OperatorLink
 
@@ -200,3 +202,26 @@ def test_a_link_in_words():
     assert str(OperatorLink.of_text(" delay=0.5 , loss=0.1,bandwidth=200")) == (
         "orders take 0.5 s and share 200 bytes/s; 10 % of them are lost"
     )
+
+
+@pytest.mark.parametrize("threaded", [False, True])
+def test_orders_keep_the_name_of_who_gave_them_on_the_way_and_after_a_seek(tmp_path, threaded):
+    link = OperatorLink(delay=0.5)
+    with (
+        Simulation(mission(), 1) as simulation, Recorder(simulation, tmp_path / "run"),
+        Live(simulation, threaded=threaded, is_paused=True, link=link) as live,
+    ):  # fmt: skip
+        with given_by("Ada"):
+            live.publish(Go, receivers=[2], speed=4.0, note="go")
+        live.drive(1, [1.0, 0.0, 0.0])
+        with given_by("Ben"):
+            live.publish(Go, receivers=[3], speed=5.0, note="go")
+            live.drive(2, [0.0, 1.0, 0.0])
+        live.step(10)
+        while live.step_number < 10:
+            time.sleep(0.01)
+        live.seek(0.3)
+        live.step(12)
+        while live.step_number < 15:
+            time.sleep(0.01)
+    assert [each.by for each in load_inputs(tmp_path / "run")] == ["Ada", "", "Ben", "Ben"]

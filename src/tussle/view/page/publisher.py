@@ -17,6 +17,7 @@ import numpy as np
 from tussle.documents import Real
 from tussle.errors import ParameterError
 from tussle.pacing import POLL_PERIOD
+from tussle.record.inputs import given_by
 from tussle.record.run_file import mission_entry
 from tussle.view.curves import numbers_of
 from tussle.view.frame import Event, Frame
@@ -185,8 +186,13 @@ class FramePublisher:
     # -- one browser ----------------------------------------------------------------------------------------------------------------
 
     async def serve(self, socket: Socket, role: PageRole) -> None:
-        """Send to a browser and take what it sends, until it goes."""
+        """Send to a browser and take what it sends, until it goes. Its orders are recorded as given by its role."""
         reader = Reader(socket, role)
+        with given_by(str(role)):
+            await self._serve(reader, socket)
+
+    async def _serve(self, reader: Reader, socket: Socket) -> None:
+        """Send and take."""
         self.readers.append(reader)
         sender = asyncio.create_task(self._send(reader))
         try:
