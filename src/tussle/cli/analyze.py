@@ -19,6 +19,7 @@ from tussle.batch.statistics import PairedComparison, Share
 from tussle.batch.variables import Range, Variable
 from tussle.cli.batch import answer_tables, short_names
 from tussle.cli.batch_options import AnalyzeOptions, ReportOptions
+from tussle.cli.orders import analyze_orders, is_run
 from tussle.cli.progress import home_short
 from tussle.cli.tables import Cell, Row, indented, number_tables, title
 from tussle.cli.terminal import out, put, say_note
@@ -46,12 +47,24 @@ def report(options: ReportOptions) -> None:
 
 
 def analyze(options: AnalyzeOptions) -> None:
-    """Print the analysis of a batch.
+    """Print the analysis of a batch, or of the orders in a recorded run.
 
     Raises:
         BatchError: The directory holds no batch.
-        ParameterError: There is no such quantity or point.
+        RecordError: The run cannot be read.
+        ParameterError: There is no such quantity or point, or an option is for batches.
     """
+    if is_run(options.directory):
+        of_batches = {
+            "--quantity": options.quantities,
+            "--compare": options.compare,
+            "--target": options.target,
+            "--over": options.over,
+            "--by-point": options.by_point,
+        }
+        given = [name for name, value in of_batches.items() if value]
+        analyze_orders(options.directory, options.as_json, given)
+        return
     compare = [options.compare] if options.compare else []
     results = load_batch(options.directory)
     found = analyse(results, options.quantities, compare)

@@ -268,9 +268,9 @@ class StressOptions(ManyGamesOptions):
 
 @dataclass(frozen=True, kw_only=True)
 class AnalyzeOptions:
-    """Show who won a batch and how sure that is, how points differ, and which variables matter."""
+    """Show who won a batch and how sure that is, how points differ, and which variables matter; of a run, who gave which orders."""
 
-    directory: Annotated[Path, argument("BATCH", "A batch directory, complete or not.")]
+    directory: Annotated[Path, argument("BATCH", "A batch directory, complete or not; or a run directory.")]
     quantities: Annotated[
         list[str],
         option(

@@ -1,0 +1,143 @@
+"""`tussle analyze RUN`: who gave which orders in a recorded game."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import typer
+from rich.console import RenderableType
+from rich.text import Text
+
+from tussle.cli.tables import Row, indented, number_tables, title
+from tussle.cli.terminal import put, say_note
+from tussle.declare.displays import counted
+from tussle.errors import ParameterError
+from tussle.record.input_table import inputs_of
+from tussle.record.inputs import ExternalInput
+from tussle.record.run import Run, load_run
+from tussle.record.schema import RUN_FILE, TRAJECTORY_FILE
+
+NOBODY = "(not said)"
+"""Shown for inputs of which nobody said who gave them."""
+
+
+def is_run(directory: Path) -> bool:
+    """Whether a directory is that of a recorded run."""
+    return any((directory / name).is_file() for name in (TRAJECTORY_FILE, RUN_FILE))
+
+
+@dataclass
+class Giver:
+    """What somebody gave into the game.
+
+    Attributes:
+        by: Who.
+        first: Time of the first input [s].
+        last: Time of the last [s].
+        names: Type of message, or path of a column -> how often.
+        entities: (world, id) of the entities that messages were for.
+    """
+
+    by: str
+    first: float
+    last: float
+    names: Counter[str] = field(default_factory=Counter)
+    entities: set[tuple[int, int]] = field(default_factory=set)
+
+    def add(self, world: int, t: float, given: ExternalInput) -> None:
+        """Count an input."""
+        self.first, self.last = min(self.first, t), max(self.last, t)
+        self.names[given.name] += 1
+        entity = given.values.get("entity") if isinstance(given.values, dict) else None
+        self.entities.update(
+            (world, who) for who in (*given.to, *([entity] if isinstance(entity, int) else []))
+        )
+
+    def as_dict(self) -> dict[str, Any]:
+        """As JSON."""
+        n, entities = self.names.total(), len(self.entities)
+        return {
+            "by": self.by,
+            "orders": n,
+            "entities": entities,
+            "first": self.first,
+            "last": self.last,
+            "names": self.names,
+        }
+
+
+def givers_of(run: Run) -> list[Giver]:
+    """Who gave what in all worlds of a run, in the order of the names.
+
+    Raises:
+        RecordError: An input is damaged.
+    """
+    found: dict[str, Giver] = {}
+    table = run.inputs_table
+    times = dict(zip(table["step"].to_pylist(), table["t"].to_pylist(), strict=True))
+    for world in sorted(set(table["world"].to_pylist())):
+        for given in inputs_of(table, world):
+            t = times[given.step]
+            found.setdefault(given.by, Giver(given.by, t, t)).add(world, t, given)
+    return [found[by] for by in sorted(found)]
+
+
+def analyze_orders(directory: Path, as_json: bool, others: Sequence[str]) -> None:
+    """Print who gave which orders in a recorded game.
+
+    Args:
+        directory: Directory of the run.
+        as_json: Print JSON.
+        others: Options that were given and are for batches.
+
+    Raises:
+        ParameterError: There are such options.
+        RecordError: The run cannot be read.
+    """
+    if others:
+        raise ParameterError(f"{directory} is a recorded run, and {others[0]} is for batches")
+    run = load_run(directory, is_mapped=True)
+    givers, name = givers_of(run), str(run.info.get("mission", {}).get("name", "") or directory.name)
+    if as_json:
+        typer.echo(
+            json.dumps(
+                {"name": name, "path": str(directory), "orders": [g.as_dict() for g in givers]}, indent=1
+            )
+        )
+        return
+    n = sum(giver.names.total() for giver in givers)
+    put(
+        "",
+        title(name, f"{counted(n, 'order')} from outside", str(directory)),
+        *(_tables(givers) if givers else ()),
+        "",
+    )
+    for note in run.notes:
+        say_note(note)
+
+
+def _tables(givers: Sequence[Giver]) -> Iterable[RenderableType]:
+    rows: list[Row] = [
+        (
+            "",
+            [
+                g.by or NOBODY,
+                f"{g.names.total():,}",
+                f"{len(g.entities):,}",
+                f"{g.first:.4g}",
+                f"{g.last:.4g}",
+            ],
+        )
+        for g in givers
+    ]
+    yield indented(Text("who gave orders", "bold cyan"))
+    yield from number_tables(["", "orders", "entities", "first [s]", "last [s]"], rows)
+    names = sorted({name for giver in givers for name in giver.names})
+    counts: list[Row] = [("", [name, *(f"{g.names[name] or ''}" for g in givers)]) for name in names]
+    yield indented(Text("which", "bold cyan"))
+    yield from number_tables(["", *(g.by or NOBODY for g in givers)], counts)

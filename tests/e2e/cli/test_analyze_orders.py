@@ -1,0 +1,51 @@
+"""tussle analyze of a recorded game: who gave which orders."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from tussle import Block, Mission, Recorder, Simulation
+from tussle.messages import RemoveEntity, Waypoint
+from tussle.record import given_by
+from tussle.stock import Boids, SingleIntegrator
+
+
+@pytest.fixture
+def steered(folder):
+    """A run of two people, and of a program that does not say who it is."""
+    robots = Block(name="robots", count=4, variance=(90, 90, 0), autonomy=Boids(), motion=SingleIntegrator())
+    mission = Mission(name="orders", blocks=[robots], end=3.0, dt=0.1)
+    with Simulation(mission, 1) as sim, Recorder(sim, folder / "steered"):
+        for step in range(10):
+            with given_by("Ada" if step % 2 else "Ben"):
+                sim.publish(Waypoint, pos=(float(step), 0.0, 0.0))
+            sim.step()
+        with given_by("Ada"):
+            sim.publish(RemoveEntity, entity=3, why="order")
+        sim.write("robots.Boids.max_speed", 5.0)
+        sim.run()
+    return folder / "steered"
+
+
+def test_each_has_a_row_with_what_they_gave(tussle, steered):
+    lines = [line.split() for line in tussle("analyze", steered).stdout.splitlines()]
+    assert ["Ada", "6", "1", "0.1", "1"] in lines
+    assert ["Ben", "5", "0", "0", "0.8"] in lines
+    assert ["(not", "said)", "1", "0", "1", "1"] in lines
+    assert ["Waypoint", "5", "5"] in lines
+
+
+def test_json(tussle, steered):
+    found = json.loads(tussle("analyze", steered, "--json").stdout)["orders"]
+    assert [(each["by"], each["orders"]) for each in found] == [("", 1), ("Ada", 6), ("Ben", 5)]
+    assert found[1]["names"] == {"Waypoint": 5, "RemoveEntity": 1}
+
+
+def test_a_run_without_orders_and_options_of_batches(tussle, folder, steered):
+    with Simulation(Mission(blocks=[], end=1.0), 1) as sim, Recorder(sim, folder / "quiet"):
+        sim.run()
+    assert "0 orders from outside" in tussle("analyze", folder / "quiet").stdout
+    refused = tussle("analyze", steered, "--by-point", code=1)
+    assert "is a recorded run, and --by-point is for batches" in " ".join(refused.stderr.split())
