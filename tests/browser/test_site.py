@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import threading
+from contextlib import suppress
 from functools import partial
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 
 import needs
 import pytest
+from playwright.sync_api import TimeoutError as PlaywrightTimeout
 
 pytestmark = [pytest.mark.needs("mkdocs"), pytest.mark.needs("browser")]
 PHONE = {"width": 390, "height": 844}
@@ -54,8 +56,12 @@ def test_colours_follow_the_system(watched, address):
 
 def test_search_finds_a_public_name(watched, address):
     tab = watched(address)
-    tab.goto(address, wait_until="networkidle")
-    tab.fill("input.md-search__input", "load_batch")
     found = tab.locator(".md-search-result__item a").first
-    found.wait_for(timeout=300_000)  # the index of all pages is read first, which a busy machine does slowly
+    for attempt in range(10):  # the theme loses what is typed while it starts
+        tab.goto(address, wait_until="networkidle")
+        tab.fill("input.md-search__input", "load_batch")
+        with suppress(PlaywrightTimeout):
+            # The index of all pages is read first, which a busy machine does slowly.
+            found.wait_for(timeout=4_000 * 1.6**attempt)
+            break
     assert "reference/tussle.batch/" in found.get_attribute("href")
