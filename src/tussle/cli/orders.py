@@ -16,7 +16,7 @@ from rich.text import Text
 from tussle.cli.tables import Row, indented, number_tables, title
 from tussle.cli.terminal import put, say_note
 from tussle.declare.displays import counted
-from tussle.errors import ParameterError
+from tussle.errors import ParameterError, clipped
 from tussle.record.input_table import inputs_of
 from tussle.record.inputs import ExternalInput
 from tussle.record.run import Run, load_run
@@ -24,6 +24,8 @@ from tussle.record.schema import RUN_FILE, TRAJECTORY_FILE
 
 NOBODY = "(not said)"
 """Shown for inputs of which nobody said who gave them."""
+MAX_NAME_SHOWN = 40
+"""Characters of a name in a table."""
 
 
 def is_run(directory: Path) -> bool:
@@ -54,9 +56,8 @@ class Giver:
         self.first, self.last = min(self.first, t), max(self.last, t)
         self.names[given.name] += 1
         entity = given.values.get("entity") if isinstance(given.values, dict) else None
-        self.entities.update(
-            (world, who) for who in (*given.to, *([entity] if isinstance(entity, int) else []))
-        )
+        ids = (*given.to, entity) if isinstance(entity, int) else given.to
+        self.entities.update((world, who) for who in ids)
 
     def as_dict(self) -> dict[str, Any]:
         """As JSON."""
@@ -104,11 +105,8 @@ def analyze_orders(directory: Path, as_json: bool, others: Sequence[str]) -> Non
     run = load_run(directory, is_mapped=True)
     givers, name = givers_of(run), str(run.info.get("mission", {}).get("name", "") or directory.name)
     if as_json:
-        typer.echo(
-            json.dumps(
-                {"name": name, "path": str(directory), "orders": [g.as_dict() for g in givers]}, indent=1
-            )
-        )
+        document = {"name": name, "path": str(directory), "orders": [giver.as_dict() for giver in givers]}
+        typer.echo(json.dumps(document, indent=1))
         return
     n = sum(giver.names.total() for giver in givers)
     put(
@@ -122,22 +120,26 @@ def analyze_orders(directory: Path, as_json: bool, others: Sequence[str]) -> Non
 
 
 def _tables(givers: Sequence[Giver]) -> Iterable[RenderableType]:
-    rows: list[Row] = [
-        (
-            "",
-            [
-                g.by or NOBODY,
-                f"{g.names.total():,}",
-                f"{len(g.entities):,}",
-                f"{g.first:.4g}",
-                f"{g.last:.4g}",
-            ],
+    who = [_clipped(giver.by) or NOBODY for giver in givers]
+    rows: list[Row] = []
+    for by, giver in zip(who, givers, strict=True):
+        numbers = (
+            f"{giver.names.total():,}",
+            f"{len(giver.entities):,}",
+            f"{giver.first:.4g}",
+            f"{giver.last:.4g}",
         )
-        for g in givers
-    ]
+        rows.append(("", [by, *numbers]))
     yield indented(Text("who gave orders", "bold cyan"))
     yield from number_tables(["", "orders", "entities", "first [s]", "last [s]"], rows)
     names = sorted({name for giver in givers for name in giver.names})
-    counts: list[Row] = [("", [name, *(f"{g.names[name] or ''}" for g in givers)]) for name in names]
+    counts: list[Row] = [
+        ("", [_clipped(name), *(f"{g.names[name] or ''}" for g in givers)]) for name in names
+    ]
     yield indented(Text("which", "bold cyan"))
-    yield from number_tables(["", *(g.by or NOBODY for g in givers)], counts)
+    yield from number_tables(["", *who], counts)
+
+
+def _clipped(name: str) -> str:
+    """A name from a file, on one line and not long."""
+    return clipped(" ".join(name.split()), MAX_NAME_SHOWN)

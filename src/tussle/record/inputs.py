@@ -14,6 +14,7 @@ import numpy as np
 from tussle.declare.columns import Handle, Numbers
 from tussle.declare.lists import RaggedColumn
 from tussle.declare.messages import Message, Messages
+from tussle.errors import ParameterError
 
 MESSAGE, COLUMN = "message", "column"
 
@@ -46,6 +47,8 @@ class ExternalInput:
 
 GIVER: ContextVar[str] = ContextVar("GIVER", default="")
 """Who gives what comes from outside now, in this thread."""
+MAX_NAME = 100
+"""Characters of the name of who gives it."""
 
 
 @contextmanager
@@ -53,8 +56,16 @@ def given_by(name: str) -> Generator[None]:
     """Record what comes from outside within as given by somebody: messages that are published, and columns that are written.
 
     Args:
-        name: Who gives it.
+        name: Who gives it; printable, at most 100 characters.
+
+    Raises:
+        ParameterError: It is not.
     """
+    given: Any = name  # programs without type checks pass anything
+    if not (isinstance(given, str) and given.isprintable() and len(given) <= MAX_NAME):
+        raise ParameterError(
+            f"given_by: {name!r:.{MAX_NAME}} is not allowed; it takes a printable text of at most {MAX_NAME} characters"
+        )
     token = GIVER.set(name)
     try:
         yield

@@ -9,6 +9,7 @@ import pytest
 from tussle import Block, Mission, Recorder, Simulation
 from tussle.messages import RemoveEntity, Waypoint
 from tussle.record import given_by
+from tussle.record.inputs import GIVER
 from tussle.stock import Boids, SingleIntegrator
 
 
@@ -49,3 +50,16 @@ def test_a_run_without_orders_and_options_of_batches(tussle, folder, steered):
     assert "0 orders from outside" in tussle("analyze", folder / "quiet").stdout
     refused = tussle("analyze", steered, "--by-point", code=1)
     assert "is a recorded run, and --by-point is for batches" in " ".join(refused.stderr.split())
+
+
+def test_names_in_a_recording_of_others_are_shown_on_one_line(tussle, folder):
+    robot = Block(name="robot", count=1, autonomy=Boids(), motion=SingleIntegrator())
+    with Simulation(Mission(blocks=[robot], end=1.0), 1) as sim, Recorder(sim, folder / "odd"):
+        for by in ("[bold]x[/nope]", "\x1b[2J\n" * 9, "y" * 5000):
+            token = GIVER.set(by)
+            sim.publish(Waypoint, pos=(1.0, 0.0, 0.0))
+            GIVER.reset(token)
+    text = tussle("analyze", folder / "odd").stdout
+    assert "[bold]x[/nope]" in text
+    assert "\x1b[2J" not in text
+    assert len(text) < 5000

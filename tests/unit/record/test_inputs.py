@@ -348,3 +348,16 @@ def test_inputs_of_a_run_that_does_not_say_who_gave_them(tmp_path):
     inputs = load_inputs(tmp_path / "run")
     table = load_run(tmp_path / "run").inputs_table
     assert inputs_of(table.drop_columns(["by"]), 0) == inputs
+
+
+@pytest.mark.parametrize("name", [3, None, "\ud800", "a\nb", "x" * 101])
+def test_a_name_that_cannot_be_recorded_is_refused_and_loses_nothing(tmp_path, name):
+    with Simulation(mission(), 1) as sim, Recorder(sim, tmp_path / "run"):
+        with (
+            pytest.raises(ParameterError, match=r"given_by: .* is not allowed; it takes a printable text"),
+            given_by(name),
+        ):
+            pass
+        sim.publish(Course, speed=1.0, why="so")
+        sim.step(2)
+    assert [each.by for each in load_inputs(tmp_path / "run")] == [""]
