@@ -341,6 +341,25 @@ class SoundBehavior(Behavior):
         self.desired_velocity[:] = 0.1 * g.pos + g.call("max_desired_speed")
 
 
+@kernel("F F Fw Fw")
+def count_up(x, turns, turned, speed):
+    for i in range(x.shape[0]):
+        turned[i] = turns[i] + 1.0
+        speed[i] = 3.0 + 0.1 * turned[i] + 0.01 * x[i]
+
+
+class SoundByKernels(Autonomy):
+    """Goes ever faster, by a kernel."""
+
+    grade = "portable"
+    only_calls_kernels = True
+    turns = State()
+    speed = Output(unit="m/s")
+
+    def step(self, g: GroupView) -> None:
+        count_up(g.components("pos")[0], self.turns, self.turns, self.speed)
+
+
 SOUND = [v for k, v in list(globals().items()) if k.startswith("Sound")]
 
 
@@ -800,7 +819,18 @@ class IgnoresBody(SoundMotion):
         self.x[3, rows] = body.yaw[rows]
 
 
+class DoesMore(SoundByKernels):
+    """Turns without a kernel."""
+
+    only_calls_kernels = True
+
+    def step(self, g: GroupView) -> None:
+        self.turns += 1.0
+        SoundByKernels.step(self, g)
+
+
 BROKEN = {
+    "only_calls_kernels": [DoesMore],
     "declarations": [NoDoc, ListOnClass, NotAHook, OwnInit, NothingToDo, DeclaresPos],
     "stack invariance": [
         CountsRows,

@@ -45,6 +45,9 @@ class Context:
         boxes: Lengths of the boxes of each block for rays [m], (n_blocks, 3); 0 for spheres.
         move: Places entities: move(rows, pos=, vel=, quat=, omega=) as `WorldView.move`; their motion models go on from there at once.
         mass_properties: Returns mass, inertia and weight of all rows of the body table.
+        steady: Number of steps for which rows have to stay the same until the arguments of kernels are packed.
+        steady_steps: This number where rows stay the same for long, and where they do not: to pack takes as long as ten steps save.
+        later: What `GroupView.finish` is called with, where the calls of kernels are recorded.
         is_interrupted: Whether the user asked to stop; a plugin that waits for others then waits no longer.
     """
 
@@ -67,6 +70,9 @@ class Context:
     mass_properties: Callable[[], MassProperties] = field(init=False)
     shared: dict[Hashable, Any] = field(default_factory=dict)
     is_interrupted: Callable[[], bool] = lambda: False
+    steady: int = 12
+    steady_steps: tuple[int, int] = (1, 12)
+    later: list[Any] | None = None
     _pool: ThreadPoolExecutor | None = None
 
     def __post_init__(self) -> None:

@@ -194,6 +194,12 @@ class GroupView:
         else:
             self.context.split(self.n, lambda *part: kernel(*arguments, part), least)
 
+    def finish(self, function: Callable[[], None]) -> None:
+        """Call a function that reads what kernels have written, last in the step of a plugin that `only_calls_kernels`."""
+        if self.context.later is not None:
+            self.context.later.append((self, self._caller, function))
+        function()
+
     def once(self, function: Callable[..., Any], *parameters: np.ndarray) -> Any:
         """Return function(*parameters), evaluated again only after rows or parameters have changed; for columns of parameters."""
         key = function, id(parameters[0])

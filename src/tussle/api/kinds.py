@@ -21,6 +21,10 @@ class EntityPlugin(Plugin):
     """A plugin of an entity; abstract."""
 
     kind: ClassVar[str] = "entity plugin"
+    only_calls_kernels: ClassVar[bool] = False
+    """All that the plugin does in a step is to call kernels and neighbour laws, always the same ones with the same columns, arrays and
+    numbers, so that compiled code may call them again. Kernels return nothing, or True where the next one is to be called; what else they
+    find is in an array that `GroupView.finish` reads. Classes do not inherit it."""
     wired: frozenset[str]
     """In a simulation: names of the outputs that other plugins read. Other outputs need not be written."""
 

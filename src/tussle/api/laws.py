@@ -221,10 +221,6 @@ def own_columns(cls: Any) -> dict[str, str]:
     return found
 
 
-MIN_USES = 12
-"""A chain is made when rows have stayed the same for so many steps: to pack its arguments takes as long as ten steps save."""
-
-
 @dataclass(slots=True, eq=False)
 class Gathered:
     """What a pair loop takes while rows and parameters stay the same.
@@ -311,14 +307,14 @@ class WalkPlan:
                     bodies.by_place(index, name, split)
                 arrays = self._with_points(bodies, index, blocks, arrays)
                 kept.uses += 1
-                if kept.uses == MIN_USES and split is None:
+                if kept.uses == g.context.steady and split is None:
                     kept.chain = self._turns(g, kept, arrays)
                 return blocks, arrays
             if index.blocks(g.first, g.last, share).spans is arrays[0][1]:
                 for name, _ in self.other:
                     bodies.by_place(index, name, split)
                 kept.uses += 1
-                if kept.uses == MIN_USES and split is None:
+                if kept.uses == g.context.steady and split is None:
                     kept.chain = self._chain(g, kept)
                 return blocks, arrays
         blocks = index.blocks(g.first, g.last, share)

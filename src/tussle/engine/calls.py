@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, overload
 
+from tussle.api.group import GroupView
 from tussle.errors import ParameterError, listed, nearest_name
 
 
@@ -17,11 +18,13 @@ class Call:
         label: Its description, which `describe` prints.
         run: The function to call.
         names: What it is called by in `Schedule.insert`: "motion", "Unicycle"; besides them, its label.
+        views: Views of plugins that only call kernels; none if there may be others.
     """
 
     label: str
     run: Callable[[], None]
     names: tuple[str, ...] = ()
+    views: tuple[GroupView, ...] = ()
 
 
 class Schedule(Sequence[Call]):
@@ -31,12 +34,19 @@ class Schedule(Sequence[Call]):
 
     Args:
         compose: Returns the calls of the plugins and of the engine.
+        join: Returns the functions of a step for its calls; one function may be that of several calls.
         owner: What inserted functions are called with.
     """
 
-    def __init__(self, compose: Callable[[], list[Call]], owner: Callable[[], Any]) -> None:
-        self._compose, self._owner = compose, owner
+    def __init__(
+        self,
+        compose: Callable[[], list[Call]],
+        join: Callable[[list[Call]], list[Callable[[], None]]],
+        owner: Callable[[], Any],
+    ) -> None:
+        self._compose, self.join, self._owner = compose, join, owner
         self._calls: list[Call] | None = None
+        self._functions: list[Callable[[], None]] | None = None
         self._inserted: list[tuple[str, bool, Call]] = []
 
     @property
@@ -48,6 +58,13 @@ class Schedule(Sequence[Call]):
                 calls.insert(_place(calls, name, is_before), call)
             self._calls = calls
         return self._calls
+
+    @property
+    def functions(self) -> list[Callable[[], None]]:
+        """The functions of a step, in order."""
+        if self._functions is None or self._calls is None:
+            self._functions = self.join(self.calls)
+        return self._functions
 
     def forget(self) -> None:
         """Compose the calls again before the next step."""
@@ -93,6 +110,7 @@ class Schedule(Sequence[Call]):
         made = Call(label, run)
         place = (before, True) if before is not None else (str(after), False)
         self.calls.insert(_place(self.calls, *place), made)
+        self._functions = None
         self._inserted.append((*place, made))
         return made
 

@@ -144,7 +144,9 @@ def _advance_call(state: SimulationState, group: Group, dt: float, substeps: int
             except Exception as error:
                 raise failure.in_call(error, plugin, view, group) from error
 
-    return Call(_label(state, "motion", group, group.motion), run, _names("motion", group.motion))
+    label, names = _label(state, "motion", group, group.motion), _names("motion", group.motion)
+    is_joined = _only_calls_kernels(state, group.motion) and not (await_ready or group.stacks_inputs)
+    return Call(label, run, names, (view,) if is_joined else ())
 
 
 def _steering_call(state: SimulationState, steering: Steering, dt: float, substeps: int) -> Call:
@@ -163,7 +165,8 @@ def _steering_call(state: SimulationState, steering: Steering, dt: float, subste
     place = f" {group.place}" if state.population.is_sequential else ""
     plugins = [b.spec.instance_name for b in (*group.controllers, group.motion)]
     label = f"{'control, move':<12} {group.name}{place}: {', '.join(plugins)}, {substeps} substeps in one"
-    return Call(label, run, ("controller", "motion", *plugins))
+    is_joined = steering.ranged is None and _only_calls_kernels(state, group.motion)
+    return Call(label, run, ("controller", "motion", *plugins), (view, body) if is_joined else ())
 
 
 def _entity_call(state: SimulationState, kind: str, group: Group, binding: Binding, substep: int = 0) -> Call:
@@ -226,7 +229,16 @@ def _entity_call(state: SimulationState, kind: str, group: Group, binding: Bindi
 
     is_plain = cadence is None and not (inboxes or await_ready or is_linked)
     label = _label(state, kind, group, binding, substep)
-    return Call(label, run_plain if is_plain else run, _names(kind, binding))
+    is_joined = is_plain and kind == "autonomy" and _only_calls_kernels(state, binding)
+    return Call(label, run_plain if is_plain else run, _names(kind, binding), (view,) if is_joined else ())
+
+
+def _only_calls_kernels(state: SimulationState, binding: Binding) -> bool:
+    """Whether all that a plugin does in a step is to call kernels, in one thread, with the same arguments while rows stay the same."""
+    is_alone = state.context.threads == 1 and not state.population.is_sequential
+    return is_alone and all(
+        vars(type(b.plugin)).get("only_calls_kernels") and not b.handles for b in binding.walk()
+    )
 
 
 def _names(kind: str, binding: Binding | WorldBinding) -> tuple[str, ...]:

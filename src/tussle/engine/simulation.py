@@ -22,6 +22,7 @@ from tussle.engine import access
 from tussle.engine.arrivals import reset, spawn_due
 from tussle.engine.calls import Schedule
 from tussle.engine.delivery import order
+from tussle.engine.joined_calls import joined
 from tussle.engine.reseed import branch_keys, renew_keys, set_rekeys
 from tussle.engine.result import WorldResult
 from tussle.engine.rows import place
@@ -96,7 +97,7 @@ class Simulation:
         self.state.context.simulation = weakref.ref(self)
         self.state.context.move = partial(place, self.state)
         self.events = self.state.events
-        self.schedule = Schedule(partial(compose, self.state), weakref.ref(self))
+        self.schedule = Schedule(partial(compose, self.state), partial(joined, self.state), weakref.ref(self))
         self.events.on_change = self.state.population.on_new_group = self.schedule.forget
         try:
             self.reset(range(self.n_worlds))
@@ -168,8 +169,8 @@ class Simulation:
                     observer(self)
             if state.rekeys:
                 branch_keys(state)
-            for call in self.schedule.calls:
-                call.run()
+            for function in self.schedule.functions:
+                function()
         except PluginError as error:
             self._stop(error)
 

@@ -23,6 +23,11 @@ DATA = 4
 class Bound:
     """A kernel and its arguments.
 
+    Args:
+        kernel: The kernel.
+        *arguments: Its arguments.
+        is_checked: Whether it has been called with them.
+
     Attributes:
         entry: Address of the code to call with the address of the words, see `call_bound`.
         words: Address of the kernel, its results and its arguments, (k,).
@@ -32,12 +37,12 @@ class Bound:
         TypeError: An argument does not match the kernel's signature.
     """
 
-    def __init__(self, kernel: Kernel, *arguments: Any) -> None:
+    def __init__(self, kernel: Kernel, *arguments: Any, is_checked: bool = False) -> None:
         self._kernel, self._arguments = kernel, arguments  # their memory is used
         words = [kernel.address, *([0] * len(kernel.results))]
         self.at: list[Any] = []
         for code, value in zip(kernel.arguments, arguments, strict=True):
-            if wrong := mismatch(code, value):
+            if not is_checked and (wrong := mismatch(code, value)):
                 raise TypeError(f"kernel {kernel.name}: a bound argument is {wrong}")
             if isinstance(code, tuple):
                 places = []
@@ -65,7 +70,7 @@ def packed(code: str, value: Any) -> list[int]:
 def entry(signature: tuple[Code, ...], results: tuple[str, ...]) -> int:
     """Address of machine code that calls a kernel of a signature: int32 (unused, error, address of words).
 
-    It is written in the compiler's intermediate language, which takes a few milliseconds.
+    It is written in the compiler's intermediate language, as text, and not optimized, which takes one or two milliseconds.
     """
     from llvmlite import binding, ir
     from numba.core import types
@@ -77,26 +82,34 @@ def entry(signature: tuple[Code, ...], results: tuple[str, ...]) -> int:
     returned = [table[each] for each in results]
     result = types.none if not returned else returned[0] if len(returned) == 1 else types.Tuple(returned)
     kernel_type = context.call_conv.get_function_type(result, expected)
-    own_type = context.call_conv.get_function_type(types.none, [types.int64])
-    module = ir.Module()
-    function = ir.Function(module, own_type, f"tussle_entry_{len(_engines)}")
-    builder = ir.IRBuilder(function.append_basic_block())
-    words = builder.inttoptr(function.args[2], ir.IntType(64).as_pointer())
-
-    def place(k: int, type_: Any) -> Any:
-        return builder.bitcast(builder.gep(words, [ir.IntType(64)(k)]), type_.as_pointer())
-
-    first = RESULTS + len(results)
-    arguments = [builder.load(place(first + k, type_)) for k, type_ in enumerate(kernel_type.args[2:])]
-    code = builder.load(place(ADDRESS, kernel_type.as_pointer()))
-    result_at = place(RESULTS, kernel_type.args[0].pointee)
-    builder.ret(builder.call(code, [result_at, function.args[1], *arguments]))
-    compiled = binding.parse_assembly(str(module))
-    machine = binding.Target.from_default_triple().create_target_machine(opt=1)
+    found, error, *arguments = kernel_type.args
+    word = ir.IntType(64)
+    kinds = [word, *(word if isinstance(each, ir.PointerType) else each for each in arguments)]
+    places = [ADDRESS, *range(RESULTS + len(results), RESULTS + len(results) + len(arguments))]
+    own_type = ir.FunctionType(ir.IntType(32), [found, error, *kinds[1:]])
+    name = f"tussle_entry_{len(_engines)}"
+    lines = [f"define i32 @{name}({word} %unused, {error} %error, {word} %words) {{"]
+    for place, kind in zip(places, kinds, strict=True):
+        lines += [
+            f"%at{place} = add {word} %words, {8 * place}",
+            f"%to{place} = inttoptr {word} %at{place} to {kind.as_pointer()}",
+            f"%word{place} = load {kind}, {kind.as_pointer()} %to{place}",
+        ]
+    given = ", ".join(f"{kind} %word{place}" for place, kind in zip(places[1:], kinds[1:], strict=True))
+    lines += [
+        f"%code = inttoptr {word} %word{ADDRESS} to {own_type.as_pointer()}",
+        f"%first = add {word} %words, {8 * RESULTS}",
+        f"%found = inttoptr {word} %first to {found}",
+        f"%status = call i32 %code({', '.join([f'{found} %found', f'{error} %error', given])})",
+        "ret i32 %status",
+        "}",
+    ]
+    compiled = binding.parse_assembly("\n".join(lines))
+    machine = binding.Target.from_default_triple().create_target_machine(opt=0)
     engine = binding.create_mcjit_compiler(compiled, machine)
     engine.finalize_object()
     _engines.append(engine)
-    return int(engine.get_function_address(function.name))
+    return int(engine.get_function_address(name))
 
 
 _engines: list[Any] = []

@@ -18,6 +18,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache, cached_property, update_wrapper
 from typing import Any, ClassVar, Self
+from weakref import WeakSet
 
 import numpy as np
 
@@ -43,16 +44,20 @@ class Stats:
     Attributes:
         compiled: Number of kernels compiled.
         loaded: Number of kernels loaded from disk.
+        interpreted: Number of calls of kernels that ran as Python.
         on_compile: Called with a kernel's name before it is compiled, e.g. to show progress.
     """
 
     compiled: int = 0
     loaded: int = 0
+    interpreted: int = 0
     on_compile: Callable[[str], None] | None = None
 
 
 WORD = re.compile(r"[^\s()]+")
 stats = Stats()
+ready: WeakSet[Kernel] = WeakSet()
+"""Kernels whose machine code exists."""
 _lock = threading.RLock()
 
 
@@ -332,7 +337,17 @@ class Kernel(Device):
                 built()[self.name, key] = main, result
             self._main = main
             self._compiled = result
-            type(self).__call__ = staticmethod(main)  # type: ignore[method-assign]
+            self.call_by(main)
+            ready.add(self)
+
+    @property
+    def machine_code(self) -> Callable[..., Any]:
+        """The function that Python calls for the machine code, which exists."""
+        return self._main  # type: ignore[no-any-return]
+
+    def call_by(self, function: Callable[..., Any] | None) -> None:
+        """Let calls from Python run a function; by default the machine code."""
+        type(self).__call__ = staticmethod(function or self._main)  # type: ignore[method-assign]
 
     def _made(self, key: str, reached: Fingerprint) -> tuple[Any, Any]:
         """Load or compile. Returns Numba's dispatcher and its compile result."""
@@ -381,6 +396,7 @@ class Kernel(Device):
 
     def __call__(self, *args: Any, **named: Any) -> Any:
         if is_interpreted(self.py_func):
+            stats.interpreted += 1
             return self.py_func(*args, **named)
         self._build()
         return self._main(*args, **named)

@@ -11,7 +11,7 @@ from tussle.testing.declarations import check_declarations
 from tussle.testing.game import build
 from tussle.testing.limits import check_limits
 from tussle.testing.motion import check_motion
-from tussle.testing.stacks import check_reset, check_snapshot, check_stacks
+from tussle.testing.stacks import check_kernels, check_reset, check_snapshot, check_stacks
 from tussle.testing.traces import Traces
 from tussle.testing.watch import check_calls, check_class_values, class_values
 
@@ -26,6 +26,7 @@ def check_plugin(cls: type[Plugin], *, companions: Sequence[Any] | None = None, 
     * draws: no label is drawn twice in a step, which would give the same numbers.
     * stack invariance: a world is bit-identical alone and in stacks of 1, 2, 7 and 64, in another order, with threads, deaths,
       births during the run, moved entities, and worlds that end at different times.
+    * only_calls_kernels: where the plugin promises it, its kernels called without it give the same bits.
     * reset: reset worlds equal new ones, and the other worlds do not change. snapshot: the same future follows after a restore.
     * finite: all numbers stay finite at every finite bound, and at 0.1 and 10 times each default.
     * velocity, rollout, rows, body round trip, from_body, order of convergence, convergence, advance: for motion models. vel is the
@@ -77,6 +78,7 @@ def _play(plugin: Plugin, companions: Sequence[Any], is_first: bool) -> None:
         if isinstance(plugin, MotionModel):
             check_motion(game, is_first)
         traces = Traces(game)
+        check_kernels(game)
         check_stacks(game, traces)
         check_reset(game, traces)
         check_snapshot(game, traces)

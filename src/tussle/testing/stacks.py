@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 from tussle.declare.columns import Handle
+from tussle.engine.joined_calls import JoinedCalls
 from tussle.engine.simulation import Simulation
+from tussle.errors import ConformanceError
 from tussle.testing.game import SEEDS, STEPS, ConformanceGame
-from tussle.testing.traces import Traces
+from tussle.testing.traces import Traces, columns_of, first_difference
 
 STACKS: tuple[tuple[int, int], ...] = ((1, 2), (2, 1), (7, 1), (64, 2))
 """Number of worlds, threads."""
+NEVER = 10**9
+"""Number of steps after which nothing is joined."""
 
 
 def order_of(n: int) -> list[int]:
@@ -95,6 +100,31 @@ def check_snapshot(game: ConformanceGame, traces: Traces) -> None:
         other.restore(saved)
         where = "before versus after restore into another simulation"
         _follow(other, traces, seeds, steps, "snapshot", where)
+
+
+def check_kernels(game: ConformanceGame) -> None:
+    """The kernels of a plugin that `only_calls_kernels` give the same bits where they are called without it.
+
+    Raises:
+        ConformanceError: They do not.
+    """
+    cls = type(game.plugin)
+    if not vars(cls).get("only_calls_kernels"):
+        return
+    seeds = [SEEDS[0]]
+    with Simulation(game.quiet, seeds) as sim, Simulation(game.quiet, seeds) as other:
+        for each, steady in ((sim, 1), (other, NEVER)):
+            each.state.context.steady_steps = steady, steady
+            join = partial(JoinedCalls, each.state)
+            each.schedule.join = lambda calls, join=join: [join([c]).run if c.views else c.run for c in calls]
+        for step in range(STEPS):
+            sim.step()
+            other.step()
+            if difference := first_difference(columns_of(other, 0), columns_of(sim, 0)):
+                text = (
+                    f"its step versus the kernels that it calls, alone: after step {step + 1}, {difference}"
+                )
+                raise ConformanceError(cls.__name__, "only_calls_kernels", text)
 
 
 def _follow(sim: Simulation, traces: Traces, seeds: list[int], steps: range, rule: str, where: str) -> None:

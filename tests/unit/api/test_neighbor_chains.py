@@ -5,6 +5,7 @@ import pytest
 
 from tussle import Block, Mission, Simulation
 from tussle.api import Autonomy, Output, Param, State, laws, neighbors, together
+from tussle.engine import joined_calls
 from tussle.mission import read_mission
 from tussle.numeric.address import caller
 from tussle.numeric.bound import Bound
@@ -12,7 +13,7 @@ from tussle.numeric.kernel import kernel
 from tussle.numeric.neighbors.chain import Chain, TurnChain
 from tussle.stock import RandomAttrit, SingleIntegrator
 
-ALWAYS, NEVER = 1, -1
+ALWAYS, NEVER = 1, 10**9
 """Numbers of steps after which the kernels of a law are chained."""
 
 
@@ -90,8 +91,10 @@ IN_TURN = {
 
 
 def hashes(mission, seeds, uses, monkeypatch):
-    monkeypatch.setattr(laws, "MIN_USES", uses)
+    monkeypatch.setattr(joined_calls, "AFTER_LAWS", NEVER)
     with Simulation(mission, seeds=seeds) as simulation:
+        simulation.state.context.steady_steps = uses, uses
+        simulation.state.context.steady = uses
         return [result.state_hash for result in simulation.run()]
 
 
@@ -120,10 +123,10 @@ def test_where_entities_move_one_after_another_too(name, monkeypatch):
 
 
 def test_blocks_that_need_more_room_get_it(monkeypatch):
-    monkeypatch.setattr(laws, "MIN_USES", ALWAYS)
     found, run = [], Chain.run
     monkeypatch.setattr(Chain, "run", lambda self: found.append(run(self)) or found[-1])
     simulation, other = (Simulation(crowd(interactions=()), seeds=[1]) for _ in range(2))
+    simulation.state.context.steady, other.state.context.steady = ALWAYS, NEVER
     for step in range(30):
         if step == 10:  # as if the spans had been few before
             for group in simulation.state.population.groups:
@@ -131,14 +134,12 @@ def test_blocks_that_need_more_room_get_it(monkeypatch):
                     if isinstance(kept, laws.Gathered):
                         kept.chain._call = (*kept.chain._call[:-1], (*kept.chain._call[-1][:-1], 1))
         simulation.step()
-    monkeypatch.setattr(laws, "MIN_USES", NEVER)
     other.step(30)
     assert any(each is None for each in found)
     assert simulation.state_hash() == other.state_hash()
 
 
-def test_what_a_law_returns_stays_as_it_is(monkeypatch):
-    monkeypatch.setattr(laws, "MIN_USES", ALWAYS)
+def test_what_a_law_returns_stays_as_it_is():
     kept = []
 
     class Keeper(Crowd):
@@ -150,6 +151,7 @@ def test_what_a_law_returns_stays_as_it_is(monkeypatch):
     with Simulation(
         crowd(blocks=[b.replace(autonomy=Keeper()) for b in crowd().blocks]), seeds=[1]
     ) as simulation:
+        simulation.state.context.steady = ALWAYS
         simulation.step(20)
     assert all(np.array_equal(now, then, equal_nan=True) for now, then in kept)
 

@@ -31,12 +31,14 @@ def run(s, team, first, target, switching, capture_range=4.0, room=5000):
     )
     claim_row, claim_other = np.zeros(room, np.int64), np.zeros(room, np.int64)
     own = [axis[first:].copy() for axis in s.pos]
-    n_claims = kernels.hunt(
+    n_claims = np.zeros(1, np.int64)
+    fits = kernels.hunt(
         (*own, np.full(n, capture_range)), (team[first:], np.ones(n, np.int64)), np.full(n, switching),
-        (target, target_row, claim_row, claim_other), (s.ids, s.world, index.place, index.order), first,
+        (target, target_row, claim_row, claim_other, n_claims), (s.ids, s.world, index.place, index.order), first,
         (*index.table, index.gather(team.astype(float))),
     )  # fmt: skip
-    return target_row, n_claims, claim_row, claim_other, index
+    assert fits == (n_claims[0] <= room)
+    return target_row, n_claims[0], claim_row, claim_other, index
 
 
 @pytest.mark.parametrize("tied", [False, True])

@@ -79,6 +79,7 @@ class Chain:
         *_, results, _, part, most = last.at
         assert most == part[1] + 1
         self._run = kernel_of_chains()
+        _ = self._run.compiled  # now, and not in a step that is recorded
         self._call = entries, words, cut.words, last.words, (part[1], results + DATA, room)
         self._cut, self._shape = cut.words, out.shape
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from tussle.numeric.kernel import stats
 from tussle.numeric.neighbors.lane_count import LANES
 from tussle.numeric.neighbors.lanes import inverse_sqrt
 from tussle.numeric.neighbors.law import OTHER, Law
@@ -27,6 +28,7 @@ def walk_in_python(
     def walk(
         longs: Any, points: Any, other: Any, own: Any, out: Any, first: int, part: Any, most: int
     ) -> int:
+        stats.interpreted += 1
         cuts, spans, order = longs
         n_listed = 0
         for b in range(*part):

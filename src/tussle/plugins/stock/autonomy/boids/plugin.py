@@ -32,6 +32,7 @@ class Boids(Autonomy):
     """
 
     grade = "portable"
+    only_calls_kernels = True
 
     max_speed = Param(30.0, unit="m/s", ge=0.0, doc="Desired speed.")
     comms_range = Param(200.0, unit="m", ge=0.0, doc="Distance below which entities are neighbours.")

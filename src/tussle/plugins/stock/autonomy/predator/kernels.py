@@ -11,7 +11,7 @@ from tussle.numeric.kernel import kernel
 from tussle.numeric.neighbors.search import DIFFERENT, SAME, TABLE, in_range, nearest_places, table_of
 
 
-@kernel(f"(F F F F) (I I) B (Iw Iw Iw Iw) (I I I I) i8 {TABLE} -> i8")
+@kernel(f"(F F F F) (I I) B (Iw Iw Iw Iw Iw) (I I I I) i8 {TABLE} -> b1")
 def hunt(points, teams, allow_switching, out, rows, first, arrays):
     """Choose targets and collect claims for the rows of a group that begins at row `first` of the table.
 
@@ -23,17 +23,17 @@ def hunt(points, teams, allow_switching, out, rows, first, arrays):
         teams: Own team and prey_team, (n,).
         allow_switching: Whether the nearest prey is chosen in every step, (n,).
         out: target, the id of the prey or 0, (n,); target_row, its row of the body table or -1, (n,); claim_row, row of the group,
-            and claim_place, row of the body table, per claim, as many as fit; written.
+            and claim_place, row of the body table, per claim, as many as fit; count, their number, (1,); written.
         rows: id, world and place of each row of the body table; row of each place.
         first: First row of the group in the body table.
         arrays: Neighbour index, and team of each place.
 
     Returns:
-        Number of claims, which may exceed the room for them.
+        Whether there was room for all claims.
     """
     x, y, z, capture_range = points
     own_team, prey_team = teams
-    target, target_row, claim_row, claim_place = out
+    target, target_row, claim_row, claim_place, count = out
     row_id, row_world, place, order = rows
     table = table_of(arrays)
     best, ranks, places = np.empty(1), np.empty(1, np.int64), np.empty(1, np.int64)
@@ -68,7 +68,8 @@ def hunt(points, teams, allow_switching, out, rows, first, arrays):
             claim_row[k] = i
             claim_place[k] = order[claim_place[k]]
         n_claims = until
-    return n_claims
+    count[0] = n_claims
+    return n_claims <= room
 
 
 @kernel("(F F F) (F F F F) F I F2 (Fw Fw Fw)")

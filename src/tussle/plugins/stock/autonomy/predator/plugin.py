@@ -17,6 +17,7 @@ class Predator(Autonomy):
     """
 
     grade = "portable"
+    only_calls_kernels = True
 
     max_speed = Param(30.0, unit="m/s", ge=0.0, doc="Desired speed.")
     capture_range = Param(
@@ -44,14 +45,14 @@ class Predator(Autonomy):
         rows = bodies.id, index.row_world, index.place, index.order
         table = (*index.table, g.by_place(index, "team")[0])
         target_row = g.rows_of(self.target)
-        room, n_claims = 0, 16 * g.n + 64
-        while n_claims > room:  # repeat with more room if the claims did not fit; the targets do not change
-            room = n_claims
-            claim_row, claimed = np.empty(room, np.int64), np.empty(room, np.int64)
-            n_claims = kernels.hunt(
+        room, fits = 16 * g.n + 64, False
+        while not fits:  # repeat with more room if the claims did not fit; the targets do not change
+            claims, n_claims = (np.empty(room, np.int64), np.empty(room, np.int64)), np.empty(1, np.int64)
+            fits = kernels.hunt(
                 (x, y, z, self.capture_range), (g.team, self.prey_team_id), self.allow_prey_switching,
-                (self.target, target_row, claim_row, claimed), rows, g.first, table,
+                (self.target, target_row, *claims, n_claims), rows, g.first, table,
             )  # fmt: skip
+            room = int(n_claims[0])
         wired = self.wired
         if "speed" in wired or "turn_rate" in wired or "pitch_rate" in wired:
             commands = self.speed, self.turn_rate, self.pitch_rate
@@ -60,5 +61,8 @@ class Predator(Autonomy):
             kernels.point(
                 x, y, self.max_speed, target_row, bodies.pos, self.desired_heading, self.desired_speed
             )
-        if n_claims:
-            self.capture.publish(claim_row[:n_claims], target=bodies.id[claimed[:n_claims]])
+        g.finish(lambda: self._claim(bodies.id, *claims, int(n_claims[0])))
+
+    def _claim(self, ids: np.ndarray, claim_row: np.ndarray, claimed: np.ndarray, n: int) -> None:
+        if n:
+            self.capture.publish(claim_row[:n].copy(), target=ids[claimed[:n]])

@@ -24,6 +24,7 @@ class SimpleAircraft(MotionModel):
     """
 
     grade = "portable"
+    only_calls_kernels = True
 
     turning_radius = Param(13.0, unit="m", gt=0.0, doc="Turn radius at 45 degrees of bank and speed_target.")
     min_velocity = Param(15.0, unit="m/s", ge=0.0, doc="Lowest speed.")

@@ -20,6 +20,7 @@ class SingleIntegrator(MotionModel):
     """
 
     grade = "portable"
+    only_calls_kernels = True
 
     max_speed = Param(-1.0, unit="m/s", doc="Largest speed; negative for no limit.")
     override_heading = Param(

@@ -26,6 +26,7 @@ class Unicycle(MotionModel):
     """
 
     grade = "portable"
+    only_calls_kernels = True
     historic_attributes = HistoricAttributes(
         differs={
             "use_pitch": "Unicycle follows pitch_rate unless use_pitch='false'; "

@@ -26,6 +26,7 @@ class Unicycle3D(MotionModel):
     """
 
     grade = "portable"
+    only_calls_kernels = True
 
     speed_max = Param(1.0, unit="m/s", ge=0.0, doc="Limit of the speed, forwards and backwards.")
     turn_rate_max = Param(1.0, unit="rad/s", ge=0.0, doc="Limit of turn_rate.")

@@ -1,0 +1,126 @@
+"""Calls of plugins that only call kernels, joined into one call of machine code while rows and parameters stay the same."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from tussle.api.group import GroupView
+from tussle.engine import failure
+from tussle.engine.calls import Call
+from tussle.engine.state import SimulationState
+from tussle.numeric.replay import Replay, recording
+
+WORTH = 20.0
+"""Number of steps for which rows stay the same on average, from which on it is worth packing arguments early."""
+AFTER_LAWS = 2
+"""Steps after which calls are joined, beyond those of `Context.steady`, after which the pair loop of a law is one kernel."""
+
+
+@dataclass(slots=True)
+class Joined:
+    """Calls as machine code.
+
+    Attributes:
+        replay: All kernels.
+        ends: Number of kernels up to the end of each call.
+        later: For each call, what Python does after its kernels: view, plugin and function.
+    """
+
+    replay: Replay
+    ends: list[int]
+    later: list[list[tuple[GroupView, object, Callable[[], None]]]]
+
+
+class JoinedCalls:
+    """Consecutive calls of a schedule that end with a motion model.
+
+    While rows stay the same, each step calls the same kernels with the same arguments. They are recorded in one step, in which
+    all that is kept for the current positions is computed again, and called by `Replay` from then on.
+    """
+
+    def __init__(self, state: SimulationState, calls: Sequence[Call]) -> None:
+        self.state, self.calls = state, calls
+        self.views = list(dict.fromkeys(view for call in calls for view in call.views))
+        self.n_steps = self.n_refused = self.wait = 0
+        self.mean_steps = 0.0
+
+    def run(self) -> None:
+        """Run the calls."""
+        kept = self.views[0].kept.get(self)
+        if kept is None or not all(self in view.kept for view in self.views):
+            self._begin(self.n_steps)
+        self.n_steps += 1
+        if kept.__class__ is Joined and self.n_steps > 1:
+            self._replay(kept)
+        elif self.n_steps == self.wait:
+            self._record()
+        else:
+            for call in self.calls:
+                call.run()
+
+    def _begin(self, n_steps: int) -> None:
+        """Begin anew after rows or parameters have changed, which stayed the same for a number of steps."""
+        context = self.state.context
+        self.mean_steps = 0.5 * (self.mean_steps + n_steps)
+        context.steady = context.steady_steps[self.mean_steps < WORTH]
+        self.wait = (context.steady + AFTER_LAWS) * 2**self.n_refused
+        self.n_steps = 0
+        for view in self.views:
+            view.kept[self] = True
+
+    def _replay(self, joined: Joined) -> None:
+        done = joined.replay.run()
+        bodies = self.state.population.bodies
+        bodies.touch(0, bodies.n)
+        for end, later, call in zip(joined.ends, joined.later, self.calls, strict=True):
+            if end > done:
+                call.run()
+                continue
+            for view, plugin, function in later:
+                view._caller = plugin
+                try:
+                    function()
+                except Exception as error:
+                    group = next(g for g in self.state.population.groups if view in g.views)
+                    raise failure.in_call(error, plugin, view, group) from error
+
+    def _record(self) -> None:
+        bodies, context = self.state.population.bodies, self.state.context
+        bodies.touch(0, bodies.n)
+        ends, later = [], []
+        try:
+            with recording() as recorded:
+                for call in self.calls:
+                    context.later = []
+                    call.run()
+                    ends.append(len(recorded.calls))
+                    later.append(context.later)
+        finally:
+            context.later = None
+        if recorded.is_whole and ends[-1]:
+            self.views[0].kept[self] = Joined(Replay(recorded.calls), ends, later)
+            self.n_refused = 0
+        else:
+            self.n_refused += 1
+            self.wait *= 2
+
+
+def joined(state: SimulationState, calls: Sequence[Call]) -> list[Callable[[], None]]:
+    """Return the functions of a step: those of the calls, or one for several of them."""
+    functions: list[Callable[[], None]] = []
+    first = 0
+    while first < len(calls):
+        last = first
+        for k in range(first, len(calls)):
+            if not calls[k].views:
+                break
+            if "motion" in calls[k].names:
+                last = k + 1
+        if last - first > 1:
+            functions.append(JoinedCalls(state, calls[first:last]).run)
+        else:
+            last = first + 1
+            functions.append(calls[first].run)
+        first = last
+    return functions

@@ -1,0 +1,112 @@
+"""Calls of kernels that a piece of Python makes, recorded with their arguments and made again by one call of machine code."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from tussle.numeric.address import caller
+from tussle.numeric.bound import RESULTS, Bound
+from tussle.numeric.kernel import Kernel, kernel, ready, stats
+
+_is_recording = threading.Lock()
+
+
+class KernelCalls:
+    """Calls of kernels of one thread, in order.
+
+    Attributes:
+        calls: Kernels with their arguments.
+        is_whole: Whether these are all calls, and none returned anything but True: then the same calls can be made again, and
+            a kernel that does not return True again tells that what follows would be another one.
+    """
+
+    def __init__(self) -> None:
+        self.calls: list[tuple[Any, ...]] = []
+        self.is_whole = True
+        self._thread = threading.get_ident()
+
+    def listener(self, each: Kernel) -> Callable[..., Any]:
+        """Return a function that calls a kernel and records the call."""
+        run = each.machine_code
+
+        def call(*arguments: Any, **named: Any) -> Any:
+            found = run(*arguments, **named)
+            if threading.get_ident() == self._thread:
+                self.calls.append((each, *arguments))
+                self.is_whole &= (found is None or found is True) and not named
+            return found
+
+        return call
+
+
+@contextmanager
+def recording() -> Iterator[KernelCalls]:
+    """Record the calls of kernels in this thread. Where another thread records, nothing is recorded, and the calls are not whole."""
+    recorded = KernelCalls()
+    if not _is_recording.acquire(blocking=False):
+        recorded.is_whole = False
+        yield recorded
+        return
+    kernels, before = list(ready), (len(ready), stats.interpreted)
+    try:
+        for each in kernels:
+            each.call_by(recorded.listener(each))
+        yield recorded
+    finally:
+        for each in kernels:
+            each.call_by(None)
+        recorded.is_whole &= before == (
+            len(ready),
+            stats.interpreted,
+        )  # new kernels have not been listened to
+        _is_recording.release()
+
+
+@cache
+def kernel_of_replays() -> Kernel:
+    """The kernel (entries, addresses, truths, words -> number) that calls bound kernels until one does not return True.
+
+    entries, addresses: of the bound kernels and of their words. truths: place of what each returns in `words`, -1 if it is nothing.
+    """
+    call_bound = caller("i8")
+
+    def run(entries, addresses, truths, words):  # type: ignore[no-untyped-def]
+        for k in range(entries.shape[0]):
+            call_bound(entries[k], addresses[k])
+            if truths[k] >= 0 and words[truths[k]] == 0:
+                return k
+        return entries.shape[0]
+
+    return kernel("I I I I -> i8")(run)
+
+
+class Replay:
+    """Makes recorded calls again.
+
+    Args:
+        calls: Kernels with their arguments; the memory of arrays is read at each call.
+    """
+
+    def __init__(self, calls: Sequence[tuple[Any, ...]]) -> None:
+        self._bound = [Bound(*call, is_checked=True) for call in calls]
+        starts = np.cumsum([0, *(len(each.words) for each in self._bound)])[:-1]
+        words = np.concatenate([each.words for each in self._bound])
+        entries = np.array([each.entry for each in self._bound])
+        returns = np.array([bool(call[0].results) for call in calls])
+        self._call = (
+            entries,
+            words.ctypes.data + 8 * starts,
+            np.where(returns, starts + RESULTS, -1),
+            words,
+        )
+        self._run = kernel_of_replays()
+
+    def run(self) -> int:
+        """Make the calls. Returns the number of those before the first that did not return True, or of all."""
+        return int(self._run(*self._call))

@@ -1,0 +1,291 @@
+"""Plugins that only call kernels, joined into one call of machine code, give the bits that they give one by one."""
+
+import numpy as np
+import pytest
+
+from tussle import Block, Mission, Simulation
+from tussle.api import Autonomy, Output, Param, State, neighbors
+from tussle.engine.joined_calls import Joined, JoinedCalls
+from tussle.errors import PluginError
+from tussle.mission import read_mission
+from tussle.numeric.kernel import kernel
+from tussle.numeric.neighbors.chain import kernel_of_chains
+from tussle.numeric.replay import Replay
+from tussle.stock import Boids, Predator, SimpleCapture, SingleIntegrator, Unicycle, UnicyclePID
+
+ALWAYS, NEVER = 1, 10**9
+"""Numbers of steps after which calls are joined."""
+
+
+@kernel("F F F F f8 Fw Fw Fw Fw")
+def spiral(x, y, turned, gain, dt, angle, vx, vy, vz):
+    for i in range(x.shape[0]):
+        angle[i] = turned[i] + gain[i] * dt
+        vx[i], vy[i], vz[i] = -gain[i] * y[i] + angle[i], gain[i] * x[i], 0.1 * angle[i]
+
+
+@kernel("F Fw -> i8")
+def counted(x, out):
+    n = 0
+    for i in range(x.shape[0]):
+        n += x[i] > 0.0
+    for i in range(x.shape[0]):
+        out[i] = n
+    return n
+
+
+class Spiral(Autonomy):
+    """Flies in spirals, by a kernel."""
+
+    grade = "portable"
+    only_calls_kernels = True
+    gain = Param(0.5)
+    angle = State(unit="rad")
+    velocity = Output("velocity_x velocity_y velocity_z", unit="m/s")
+
+    def step(self, g):
+        x, y, _ = g.components("pos")
+        spiral(x, y, self.angle, self.gain, g.dt, self.angle, *self.velocity)
+
+
+class Counter(Spiral):
+    """A kernel of it returns a number, which decides."""
+
+    only_calls_kernels = True
+
+    def step(self, g):
+        x, y, _ = g.components("pos")
+        if counted(x, self.angle) % 2:
+            spiral(y, x, self.angle, self.gain, g.dt, self.angle, *self.velocity)
+        else:
+            spiral(x, y, self.angle, self.gain, g.dt, self.angle, *self.velocity)
+
+
+class Fickle(Spiral):
+    """Overrides `step` with one that does more, and says nothing of kernels."""
+
+    def step(self, g):
+        super().step(g)
+        self.velocity[2] = np.sin(g.t)
+
+
+class Flock(Spiral):
+    """Has a neighbour law, and reads a computed column."""
+
+    only_calls_kernels = True
+    sight = Param(30.0, unit="m")
+
+    @neighbors("sight", east="sum", n="count")
+    @staticmethod
+    def near(offset_x, other_yaw):
+        return offset_x * 0.01 + other_yaw, True
+
+    def step(self, g):
+        found = self.near(g)
+        spiral(found.values[0], g.column("yaw"), self.angle, self.gain, g.dt, self.angle, *self.velocity)
+
+
+def swarm(autonomy, n=40, **changes):
+    block = Block(
+        name="a", team=1, count=n, placement="uniform", half_width=(50, 50, 10), scatter_first=True,
+        autonomy=autonomy, motion=SingleIntegrator(max_speed=40.0),
+    )  # fmt: skip
+    return Mission(blocks=[block], dt=0.1, end=4.0).replace(**changes)
+
+
+def steered():
+    """Boids with a controller."""
+    boids = swarm(Boids(), 30).blocks[0]
+    return Mission(
+        blocks=[boids.replace(motion=Unicycle(vel_max=40.0), controller=UnicyclePID())],
+        dt=0.1,
+        end=4.0,
+        motion_multiplier=3,
+    )
+
+
+GAME = read_mission("predator_prey").mission
+MISSIONS = {
+    "predator_prey": GAME.replace(end=30.0),
+    "substeps": GAME.replace(end=8.0, motion_multiplier=5),
+    "steered": steered(),
+    "a kernel": swarm(Spiral()),
+    "a law": swarm(Flock()),
+    "fickle": swarm(Fickle()),
+    "decides": swarm(Counter()),
+    "in view": swarm(Boids(fov_az="200 deg"), 60, end=6.0),
+    "historic means": swarm(Boids(averaging="historic"), 60, end=6.0),
+}
+NOT_JOINED = "fickle", "decides"
+
+
+@pytest.fixture
+def replays(monkeypatch):
+    """The replays of all simulations, with the number of kernels that ran in each."""
+    found, replay = [], JoinedCalls._replay
+    monkeypatch.setattr(
+        JoinedCalls, "_replay", lambda self, joined: found.append(joined) or replay(self, joined)
+    )
+    return found
+
+
+def started(mission, seeds, steady):
+    simulation = Simulation(mission, seeds=seeds)
+    simulation.state.context.steady_steps = steady, steady
+    return simulation
+
+
+def pair(mission, seeds=(1,), act=lambda simulation, step: None, steps=40):
+    """State hashes of two simulations in which the same is done before each step, joined and not."""
+    hashes = []
+    for steady in (ALWAYS, NEVER):
+        with started(mission, seeds, steady) as simulation:
+            for step in range(steps):
+                act(simulation, step)
+                simulation.step()
+            hashes.append([simulation.state_hash(world) for world in range(len(seeds))])
+    return hashes
+
+
+@pytest.mark.parametrize("name", MISSIONS)
+@pytest.mark.parametrize("seeds", [[1], [2, 3, 4]], ids=["alone", "stack"])
+def test_the_bits_are_those_of_the_calls_one_by_one(name, seeds, replays):
+    mission = MISSIONS[name]
+    joined, apart = pair(mission, seeds, steps=round(mission.end / mission.dt))
+    assert joined == apart
+    assert (len(replays) > 0.3 * mission.steps / len(seeds)) == (name not in NOT_JOINED)
+
+
+def test_onlookers_that_compute_columns_change_nothing(replays):
+    def look(simulation, step):
+        bodies = simulation.state.population.bodies
+        if step % 3 == 0 or step < 5:
+            for name in ("yaw", "level_forward", "forward"):
+                bodies.derived(name)
+            for group in simulation.state.population.groups:
+                for view in group.views:
+                    view.column("yaw")
+            bodies.by_place(bodies.index(200.0), "level_forward")
+
+    for mission in (swarm(Flock()), MISSIONS["predator_prey"]):
+        looked = pair(mission, act=look)
+        assert looked[0] == looked[1] == pair(mission)[0]
+    assert len(replays) > 40
+
+
+def test_what_is_written_between_steps_counts(replays):
+    def act(simulation, step):
+        if step == 12:
+            simulation.write("prey.Boids.comms_range", 60.0)
+        if step == 20:
+            values, _ = simulation.read("keepers.Predator.max_speed")
+            simulation.write("keepers.Predator.max_speed", 0.5 * values)
+        if step == 25:
+            simulation.write("prey.pos", simulation.read("prey.pos")[0] * 0.5)
+        if step == 30:
+            simulation.reset([1], seeds=[77], params={"prey.Boids.max_speed": 12.0})
+
+    joined, apart = pair(GAME, [5, 6], act)
+    assert joined == apart
+    assert len(replays) > 10
+
+
+def test_a_restored_game_goes_on_as_it_did(replays):
+    with started(GAME, [3], ALWAYS) as simulation:
+        simulation.step(15)
+        saved = simulation.snapshot()
+        simulation.step(30)
+        first = simulation.state_hash()
+        simulation.restore(saved)
+        simulation.step(30)
+        assert simulation.state_hash() == first
+    assert len(replays) > 30
+
+
+def few_spans(simulation):
+    """Let the room for the spans of blocks be too small, as if entities had come nearer to each other than it was made for."""
+    for view in simulation.state.population.groups[0].views:
+        for kept in view.kept.values():
+            if isinstance(kept, Joined):
+                chain = next(each for each in kept.replay._bound if each._kernel is kernel_of_chains())
+                kept.replay._call[3][chain.at[4][2]] = 1
+
+
+def many_claims(simulation):
+    """Let all prey come into the range of the hunter."""
+    simulation.write("prey.pos", 0.02 * simulation.read("prey.pos")[0])
+
+
+@pytest.mark.parametrize("happens", [few_spans, many_claims])
+def test_where_the_room_does_not_suffice_python_goes_on(happens, monkeypatch):
+    block = swarm(Boids(), 300).blocks[0].replace(name="prey", motion=Unicycle(vel_max=30.0))
+    hunter = block.replace(
+        name="hunter", team=2, count=1, position=(0, 0, 0), scatter_first=False,
+        autonomy=Predator(prey_team_id=1, capture_range=3.0), motion=Unicycle(vel_max=0.1),
+    )  # fmt: skip
+    mission = Mission(blocks=[block, hunter], dt=0.1, end=60.0, interactions=[SimpleCapture()])
+    stops, run = [], Replay.run
+
+    def watched(replay):
+        done = run(replay)
+        stops.append(done < len(replay._bound))
+        return done
+
+    monkeypatch.setattr(Replay, "run", watched)
+    joined, apart = pair(
+        mission,
+        act=lambda simulation, step: happens(simulation) if step == 8 else None,
+        steps=16,
+    )
+    assert joined == apart
+    assert stops.count(False) > 2
+    assert True in stops
+
+
+def test_a_stack_that_loses_worlds_and_calls_that_are_inserted(replays):
+    def act(simulation, step):
+        if step == 10:
+            simulation.schedule.insert(before="motion", call=lambda s: s.write("prey.Boids.speed", 9.0))
+        if step == 20:
+            simulation.schedule.remove(next(c for c in simulation.schedule if c.label == "<lambda>"))
+        if step == 30:
+            simulation.state.record_failure(1, PluginError("lost"))
+
+    joined, apart = pair(GAME.replace(blocks=GAME.blocks[:1]), [1, 2, 3], act)
+    assert joined == apart
+    assert len(replays) > 12
+
+
+def test_an_error_of_what_follows_the_kernels_names_the_plugin(replays):
+    class Torn(Spiral):
+        """Fails in what it does with what its kernel has written."""
+
+        only_calls_kernels = True
+
+        def step(self, g):
+            super().step(g)
+            g.finish(lambda: self.look(g))
+
+        def look(self, g):
+            if self.angle[0] > 0.5:
+                raise ValueError("too far")
+
+    texts = []
+    for steady in (ALWAYS, NEVER):
+        with (
+            started(swarm(Torn()), [1], steady) as simulation,
+            pytest.raises(PluginError, match="too far") as found,
+        ):
+            simulation.run()
+        texts.append(str(found.value))
+    assert texts[0] == texts[1]
+    assert "Torn" in texts[0]
+    assert len(replays) > 3
+
+
+def test_the_list_of_calls_stays_what_it_is():
+    with Simulation(GAME, seeds=[1]) as simulation:
+        before = simulation.describe()
+        simulation.step(40)
+        assert simulation.describe() == before
+        assert len(simulation.schedule.functions) == len(simulation.schedule) - 3
