@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 from typing import Any
 
 from tussle.declare.columns import Handle
+from tussle.engine.calls import Call
 from tussle.engine.joined_calls import JoinedCalls
 from tussle.engine.simulation import Simulation
+from tussle.engine.state import SimulationState
 from tussle.errors import ConformanceError
 from tussle.testing.game import SEEDS, STEPS, ConformanceGame
 from tussle.testing.traces import Traces, columns_of, first_difference
@@ -115,8 +118,7 @@ def check_kernels(game: ConformanceGame) -> None:
     with Simulation(game.quiet, seeds) as sim, Simulation(game.quiet, seeds) as other:
         for each, steady in ((sim, 1), (other, NEVER)):
             each.state.context.steady_steps = steady, steady
-            join = partial(JoinedCalls, each.state)
-            each.schedule.join = lambda calls, join=join: [join([c]).run if c.views else c.run for c in calls]
+            each.schedule.join = partial(_each_joined, each.state)
         for step in range(STEPS):
             sim.step()
             other.step()
@@ -125,6 +127,10 @@ def check_kernels(game: ConformanceGame) -> None:
                     f"its step versus the kernels that it calls, alone: after step {step + 1}, {difference}"
                 )
                 raise ConformanceError(cls.__name__, "only_calls_kernels", text)
+
+
+def _each_joined(state: SimulationState, calls: list[Call]) -> list[Callable[[], None]]:
+    return [JoinedCalls(state, [call]).run if call.views else call.run for call in calls]
 
 
 def _follow(sim: Simulation, traces: Traces, seeds: list[int], steps: range, rule: str, where: str) -> None:
