@@ -18,6 +18,7 @@ from tussle.rl.action import Actor, Decoder, learned
 from tussle.rl.computed import Computed
 from tussle.rl.observation import AgentRows
 from tussle.rl.policy_file import TASK_KEY
+from tussle.rl.reward import Situation
 from tussle.rl.swarm import task_of
 from tussle.rl.task import Task
 
@@ -208,9 +209,11 @@ class LearnedFlight:
                     f"Learned.policy = {policy.path!r} takes {policy.width} and returns {policy.n_out} numbers; agents of {name} "
                     f"observe {width} and decide by {n_out}"
                 )
-        if len(blocks) > 1 and any(isinstance(c, Computed) for c in task.components(self.block)):
+        is_computed = any(isinstance(c, Computed) for c in task.components(self.block))
+        if len(blocks) > 1 and (is_computed or task.has_mask):
+            what = "Computed observations" if is_computed else "a mask"
             raise ParameterError(
-                f"Learned: {name} has Computed observations of several blocks; give each block its own task"
+                f"Learned: {name} has {what} of several blocks; give each block its own task"
             )
 
     def decide(self, g: GroupView, columns: Mapping[str, np.ndarray]) -> None:
@@ -229,13 +232,19 @@ class LearnedFlight:
             columns[name][due] = value
         share = rng.uniform(g.context.seeds, self._draw, 0, 0)[0]
         which = (share * len(self.policies)).astype(int)[g.world[due]]
-        obs = self.observe(simulation, g)[due]
+        obs, allowed = (each[due] for each in self.observe(simulation, g))
         out = np.empty((len(due), self.policies[0].n_out), np.float32)
         for k in np.unique(which):
             out[which == k] = self.policies[k](obs[which == k])
         if not self._decoder.is_continuous:
+            out[~allowed] = -np.inf
             edges = np.cumsum(self._decoder.sizes)[:-1]
-            actions = np.stack([part.argmax(axis=1) for part in np.split(out, edges, axis=1)], axis=1)
+            parts = np.split(out, edges, axis=1)
+            stuck = np.flatnonzero([(part == -np.inf).all(axis=1) for part in parts])
+            if len(stuck):
+                row = int(due[stuck[0] % len(due)])
+                g.fail(row, f"action_mask of {type(self.task).__name__} leaves {g.who(row)} no level")
+            actions = np.stack([part.argmax(axis=1) for part in parts], axis=1)
         else:
             actions = out.astype(float)
         wrong = self._decoder.decode(actions, np.arange(len(due)), due, columns.__getitem__)
@@ -243,14 +252,15 @@ class LearnedFlight:
             path = self.policies[which[wrong]].path
             g.fail(int(due[wrong]), f"the policy {path} returned a value that is not a number")
 
-    def observe(self, simulation: Any, g: GroupView) -> np.ndarray:
-        """Observations of all rows, (n, numbers): the task's components write them, as in a swarm."""
+    def observe(self, simulation: Any, g: GroupView) -> tuple[np.ndarray, np.ndarray]:
+        """Observations of all rows, (n, numbers), and which levels they may choose, (n, levels): the task computes them, as in a swarm."""
         rows = g.first + np.arange(g.n)
         group = next(
             group for group in simulation.state.population.groups if group.first <= g.first < group.last
         )
         width = self.policies[0].width
         seen = np.zeros((g.n, width), self.task.dtype)
+        allowed = np.ones((g.n, self.policies[0].n_out), bool)
         for number in np.unique(g.block):
             mine = np.flatnonzero(g.block == number)
             place = g.block_index[mine]
@@ -266,7 +276,25 @@ class LearnedFlight:
                 component.write(simulation, part, column, out)
                 column += n
             seen[mine] = out[agents]
-        return seen
+            if self.task.has_mask:
+                allowed[mine] = self._mask(simulation, part, count)[agents]
+        return seen, allowed
+
+    def _mask(self, simulation: Any, part: AgentRows, count: int) -> np.ndarray:
+        """The task's mask of the agents of a block, up to `count` in each world, (worlds count, levels)."""
+        alive = np.zeros((simulation.n_worlds, count), bool)
+        now = Situation(simulation, np.full(count, part.team[0]), alive)
+        alive.reshape(-1)[part.agents] = True
+        now.id.reshape(-1)[part.agents] = simulation.state.population.bodies.id[part.rows]
+        now.look([part])
+        del now.was_alive, now.died, now.actions, now._events  # of the last decision, which is not known
+        shape = *alive.shape, self.policies[0].n_out
+        found = np.asarray(self.task.action_mask(now))
+        if found.dtype != bool:
+            raise ParameterError(
+                f"{type(self.task).__name__}.action_mask returns {found.dtype}; it returns truth values, {shape}"
+            )
+        return np.broadcast_to(found, shape).reshape(-1, shape[2])
 
 
 def registered_tasks() -> dict[str, Any]:

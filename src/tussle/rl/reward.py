@@ -185,7 +185,7 @@ class Situation:
             text: Only events with this text, such as the cause of a death.
 
         Raises:
-            ParameterError: There is no such kind, or `ids` is neither.
+            ParameterError: There is no such kind, `ids` is neither, or a mask asks for events where no environment plays.
         """
         if kind not in COUNTED:
             raise ParameterError(
@@ -193,6 +193,10 @@ class Situation:
             )
         if ids not in IDS:
             raise ParameterError(f"count: ids = {ids!r} is not allowed; {listed(IDS)}")
+        if "_events" not in vars(self):
+            raise ParameterError(
+                "count: where a policy flies by itself, nothing counts the events of its decisions"
+            )
         out = np.zeros(self.alive.shape)
         for events in self._events:
             if events.kind == kind:

@@ -6,6 +6,7 @@ import pickle
 import sys
 from itertools import pairwise
 
+import gymnasium
 import numpy as np
 import pytest
 
@@ -20,7 +21,7 @@ from tussle import Simulation
 from tussle.errors import MissingExtraError, ParameterError, PluginError
 from tussle.mission import read_mission
 from tussle.plugins import stock
-from tussle.rl import NearOrigin, PredatorTeam, PreyEscape, make_swarm, write_policy
+from tussle.rl import Dispersal, NearOrigin, PredatorTeam, PreyEscape, make_swarm, register, write_policy
 from tussle.rl.flight import BATCH, Policy
 from tussle.stock import Learned
 
@@ -57,6 +58,72 @@ def test_a_policy_flies_as_in_the_swarm_of_its_task(tmp_path):
             np.testing.assert_array_equal(simulation.read(path)[0], swarm.simulation.read(path)[0])
 
         assert np.ptp(simulation.read("switchers.vel")[0]) > 10
+
+
+class Counting(Dispersal):
+    """Its mask reads what only an environment knows."""
+
+    asks = "count"
+
+    def action_mask(self, now):
+        return now.count("death") == 0 if self.asks == "count" else now.died
+
+
+class Stuck(Dispersal):
+    """Its mask leaves nothing to the robots in the North after a while."""
+
+    def action_mask(self, now):
+        return (now.t[:, None, None] < 9.5) | (now.pos[..., 1:2] < 1.5) | np.zeros((1, 1, 5), bool)
+
+
+@pytest.fixture
+def masked_tasks(tmp_path):
+    for name, task in (("Counting", Counting), ("Stuck", Stuck)):
+        register(f"masked/{name}-v0", task)
+    yield
+    for name in ("Counting", "Stuck"):
+        gymnasium.registry.pop(f"masked/{name}-v0")
+
+
+def dispersal(tmp_path, task="tussle/Dispersal-v0"):
+    path = team_policy(tmp_path / "room.onnx", sum(Dispersal().widths["robot"]), 5, task)
+    return path, with_policy(Dispersal().given, "robot", policy=path)
+
+
+def test_a_policy_keeps_to_the_mask_of_its_task(tmp_path):
+    path, mission = dispersal(tmp_path)
+    (robots,) = mission.blocks
+    # All from the beginning: one that is born later decides at once, and in the swarm with the next decision.
+    robots = robots.replace(rate=None, position=(2.0, 2.0, 0.0), variance=(2.0, 2.0, 0.0))
+    mission = mission.replace(blocks=[robots.replace(autonomy=robots.autonomy[-1:])])
+    task = Dispersal(mission=mission.replace(blocks=[robots.replace(autonomy=robots.autonomy[:-1])]))
+    swarm, policy = make_swarm(task, 2), Policy(path)
+    obs, n_excluded = swarm.reset(seed=5), 0
+    for _ in range(30):
+        scores = policy(obs.reshape(-1, obs.shape[-1]))
+        free = scores.argmax(axis=1)
+        scores[~swarm.masks.reshape(-1, 5)] = -np.inf
+        n_excluded += (scores.argmax(axis=1) != free).sum()
+        obs, *_ = swarm.step(scores.argmax(axis=1).reshape(2, -1, 1))
+    assert n_excluded > 50
+    with Simulation(mission, seeds=[5, 6]) as simulation:
+        simulation.step(300)
+        np.testing.assert_array_equal(simulation.read("robot.pos")[0], swarm.simulation.read("robot.pos")[0])
+
+
+@pytest.mark.parametrize(
+    ("name", "asks", "message"),
+    [
+        ("Counting", "count", r"count: where a policy flies by itself, nothing counts the events"),
+        ("Counting", "died", r"a situation has no 'died'"),
+        ("Stuck", "", r"robot \d+, .*: action_mask of Stuck leaves robot \d+ of world 0 no level"),
+    ],
+)
+def test_a_mask_that_cannot_be_kept_to_is_told(name, asks, message, tmp_path, masked_tasks, monkeypatch):
+    monkeypatch.setattr(Counting, "asks", asks)
+    _, mission = dispersal(tmp_path, f"masked/{name}-v0")
+    with Simulation(mission, seeds=[1]) as simulation, pytest.raises(PluginError, match=message):
+        simulation.run()
 
 
 def test_worlds_are_the_same_in_any_stack(tmp_path):
