@@ -24,7 +24,7 @@ from tussle.api.bodies import (
 from tussle.api.context import Context, stream
 from tussle.api.draw import Draw
 from tussle.api.pairs import Nearest, Pairs, find_nearest, find_pairs
-from tussle.errors import PluginError, listed, nearest_name
+from tussle.errors import DeclarationError, PluginError, listed, nearest_name
 from tussle.numeric import rng
 from tussle.numeric.neighbors.index import Index, next_size
 from tussle.world.scene import Hits, Scene, TeamRegion
@@ -159,11 +159,13 @@ class GroupView:
     @property
     def t(self) -> np.ndarray:
         """Time of the visible states [s], (n,); after motion, the end of the step."""
+        self._differs("reads the time")
         return np.asarray(self.context.clock.at(self.phase)[self.world])
 
     @property
     def step_count(self) -> np.ndarray:
         """Step number of each row's world, (n,)."""
+        self._differs("reads the time")
         return np.asarray(self.context.clock.step[self.world])
 
     @property
@@ -196,9 +198,11 @@ class GroupView:
 
     def finish(self, function: Callable[[], None]) -> None:
         """Call a function that reads what kernels have written, last in the step of a plugin that `only_calls_kernels`."""
-        if self.context.later is not None:
-            self.context.later.append((self, self._caller, function))
+        later, self.context.later = self.context.later, None
         function()
+        if later is not None:
+            later.append((self, self._caller, function))
+            self.context.later = later
 
     def once(self, function: Callable[..., Any], *parameters: np.ndarray) -> Any:
         """Return function(*parameters), evaluated again only after rows or parameters have changed; for columns of parameters."""
@@ -441,7 +445,13 @@ class GroupView:
 
     # -- random numbers and services ------------------------------------------------------------------------------------------------
 
+    def _differs(self, what: str) -> None:
+        """Refuse what differs from step to step where the calls of kernels are recorded."""
+        if self.context.later is not None:
+            raise DeclarationError(f"{type(self._caller).__name__} promises only_calls_kernels, but {what}")
+
     def _stream(self, label: str) -> int:
+        self._differs(f"draws {label!r}")
         return stream(self._caller.instance_name if self._caller is not None else "", label)
 
     def uniform(self, label: str, k: int | None = None) -> np.ndarray:

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from tussle import Block, Mission, Simulation
-from tussle.api import Autonomy, Output, Param, State, neighbors
+from tussle.api import Autonomy, Output, Param, Publish, State, neighbors
 from tussle.engine.joined_calls import Joined, JoinedCalls
 from tussle.errors import PluginError
+from tussle.messages import CaptureEntity
 from tussle.mission import read_mission
 from tussle.numeric.kernel import kernel
 from tussle.numeric.neighbors.chain import kernel_of_chains
@@ -281,6 +282,35 @@ def test_an_error_of_what_follows_the_kernels_names_the_plugin(replays):
     assert texts[0] == texts[1]
     assert "Torn" in texts[0]
     assert len(replays) > 3
+
+
+class Breaks(Spiral):
+    """Does what its promise excludes, by name."""
+
+    only_calls_kernels = True
+    what = Param("time", choices=("time", "draws", "publishes"))
+    capture = Publish(CaptureEntity)
+
+    def step(self, g):
+        if self.what == "time":
+            self.angle[:] = g.t
+        elif self.what == "draws":
+            self.angle[:] = g.uniform("angle")
+        else:
+            self.capture.publish([0], target=1)
+        super().step(g)
+
+
+@pytest.mark.parametrize(
+    ("what", "text"),
+    [("time", "reads the time"), ("draws", "draws 'angle'"), ("publishes", "publishes before `finish`")],
+)
+def test_a_plugin_that_does_more_than_it_promises_is_refused(what, text):
+    with (
+        started(swarm(Breaks(what=what)), [1], 12) as simulation,
+        pytest.raises(PluginError, match=f"Breaks promises only_calls_kernels, but {text}"),
+    ):
+        simulation.run()
 
 
 def test_the_list_of_calls_stays_what_it_is():

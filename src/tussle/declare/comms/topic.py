@@ -273,4 +273,5 @@ class Publisher:
         rows = np.flatnonzero(rows) if rows.dtype == bool else rows
         if len(rows):
             view = self.view
+            view._differs("publishes before `finish`")
             self.topic.add(Messages.make(self.topic.type, view.world[rows], view.id[rows], fields))
