@@ -257,7 +257,7 @@ class FramePublisher:
             "notes": [*live.notes, *self._drawing_notes, *self._failures.texts], "error": None if error is None else str(error),
             "metrics": [] if result is None else result_rows(result, live.teams), "events": self._new_events(reader),
             "entity": self._entity(reader), "refusal": refusal, "steers": self._may_steer(reader),
-            "role": {"kind": reader.role.kind, "team": reader.role.team},
+            "role": asdict(reader.role),
             "feed": feed_rows(live.messages()) if reader.has_feed else None,
             "alarms": [
                 {k: None if isinstance(v, float) and not math.isfinite(v) else v for k, v in asdict(each).items()}
