@@ -242,8 +242,8 @@ class ViewOptions(AgainOptions, PageOptions):
     link: Annotated[
         str | None,
         option(
-            "delay=S,loss=P,bandwidth=B",
-            "Let orders come later [s], be lost with a probability, or share a bandwidth [bytes/s].",
+            "delay=S,loss=P,bandwidth=B,see=S",
+            "Let orders come later [s], be lost with a probability, or share a bandwidth [bytes/s]; show the game later [s].",
         ),
     ] = None
     spec: Annotated[
