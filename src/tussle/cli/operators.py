@@ -41,7 +41,7 @@ class OperatedGame:
         path: Directory of the run.
         world: Number of the world.
         seed: Its seed.
-        condition: Name of the folder of runs in which it was found; "" for a run that was named itself.
+        condition: Folder in which the run is.
         seconds: How long it took [s].
         results: Team -> result -> value at its end.
         givers: Who gave orders in it.
@@ -126,8 +126,8 @@ def _runs_in(folder: Path) -> list[Path]:
     return sorted(filter(is_run, folder.iterdir())) if folder.is_dir() else []
 
 
-def games_of(directories: Sequence[Path]) -> tuple[list[OperatedGame], list[str]]:
-    """The games of recorded runs and of folders of such, and notes on them.
+def games_of(directories: Sequence[Path]) -> tuple[str, list[OperatedGame], list[str]]:
+    """The name of the mission, and the games of recorded runs and of folders of such, with notes on them.
 
     Raises:
         ParameterError: A batch or a run is among them that cannot be compared with the others.
@@ -142,8 +142,7 @@ def games_of(directories: Sequence[Path]) -> tuple[list[OperatedGame], list[str]
             raise ParameterError(
                 f"{directory} is a batch, which is analyzed alone; the others are recorded runs"
             )
-        is_one = is_run(directory)
-        for path in [directory] if is_one else _runs_in(directory) or [directory]:
+        for path in _runs_in(directory) or [directory]:
             if seen.setdefault(path.resolve(), path) is not path:
                 raise ParameterError(f"{path} is given twice")
             run = _whole_run(path)
@@ -152,8 +151,8 @@ def games_of(directories: Sequence[Path]) -> tuple[list[OperatedGame], list[str]
             if mission != first["mission"]:
                 notes.append(f"{path}: the mission has other values than that of {first['path']}")
             notes += [f"{path}: {note}" for note in run.notes]
-            games += _games(path, run, "" if is_one else directory.name)
-    return games, notes
+            games += _games(path, run)
+    return str(first["mission"]["name"]), games, notes
 
 
 def _whole_run(path: Path) -> Run:
@@ -179,7 +178,7 @@ def _check_mission(path: Path, mission: dict[str, Any], first: dict[str, Any]) -
         )
 
 
-def _games(path: Path, run: Run, condition: str) -> list[OperatedGame]:
+def _games(path: Path, run: Run) -> list[OperatedGame]:
     """The worlds of a run."""
     start = float(run.info["mission"]["start"])
     rows = run.summary_table.to_pylist()
@@ -192,9 +191,8 @@ def _games(path: Path, run: Run, condition: str) -> list[OperatedGame]:
                 f"{path}: nobody gave an order in world {number}; there is nobody to compare"
             )
         results = {row["team"]: _numbers(row) for row in rows if row["world"] == number}
-        found.append(
-            OperatedGame(path, number, world["seed"], condition, float(world["t"]) - start, results, givers)
-        )
+        seconds = float(world["t"]) - start
+        found.append(OperatedGame(path, number, world["seed"], str(path.parent), seconds, results, givers))
     return found
 
 
@@ -231,7 +229,7 @@ def operators_of(games: Sequence[OperatedGame]) -> list[OperatorRecord]:
 
 
 def conditions_of(games: Sequence[OperatedGame]) -> list[OperatorRecord]:
-    """The conditions, which are the folders in which the runs were found; none where there is one only."""
+    """The conditions, which are the folders in which the runs are; none where there is one only."""
     found: dict[str, OperatorRecord] = {}
     for game in games:
         teams = list(game.results)
@@ -290,7 +288,7 @@ def analyze_operators(directories: Sequence[Path], asked: Sequence[str], as_json
     """Compare those who gave orders in recorded games, and print what they did.
 
     Args:
-        directories: Runs, and folders of runs; several of these are conditions, which are compared, too.
+        directories: Runs, and folders of runs. Runs in different folders are conditions, which are compared, too.
         asked: Quantities; by default all that differ in the games.
         as_json: Print JSON.
 
@@ -298,12 +296,10 @@ def analyze_operators(directories: Sequence[Path], asked: Sequence[str], as_json
         ParameterError: A directory cannot be compared with the others, or there is no such quantity.
         RecordError: A run cannot be read, or is damaged.
     """
-    games, notes = games_of(directories)
+    name, games, notes = games_of(directories)
     operators, conditions = operators_of(games), conditions_of(games)
     quantities = quantities_of([*operators, *conditions], asked)
     comparisons = [compared(players, quantities) for players in (operators, conditions)]
-    run = load_run(games[0].path, is_mapped=True)
-    name = str(run.info["mission"]["name"])
     if as_json:
         document = {
             "name": name,
@@ -350,7 +346,7 @@ def _tables(
     """What players did and reached, and how they differ."""
     who = [shown_name(player.name) or NOBODY for player in players]
     rows: list[Row] = [("", ["games", *(f"{len(player.parts)}" for player in players)])]
-    shown = [name for name in quantities if asked or name in ACTIVITY or _varies(players, name)]
+    shown = [name for name in quantities if asked or name in ACTIVITY or _is_telling(players, name)]
     rows += [
         ("", [shown_name(name), *(_estimate(player.mean(name)) for player in players)]) for name in shown
     ]
@@ -366,12 +362,17 @@ def _tables(
             a, b = (shown_name(name) or NOBODY for name in (pairs[0].a, other.name))
             yield _heading(f"{b} against {a}", "paired by seed")
             yield from number_tables(
-                ["", "difference", "seeds", "more", "less", "equal", "p (signs)"], [_row(c) for c in pairs]
+                ["", "difference", "more", "less", "equal", "p (signs)"], [_row(c) for c in pairs]
             )
 
 
-def _varies(players: Sequence[OperatorRecord], quantity: str) -> bool:
-    return len({part.values.get(quantity) for player in players for part in player.parts} - {None}) > 1
+def _is_telling(players: Sequence[OperatorRecord], quantity: str) -> bool:
+    """Whether a result differs from game to game, and is not the score under another name."""
+    name, bracket, team = quantity.partition("[")
+    parts = [part for player in players for part in player.parts]
+    values = [part.values.get(quantity, math.nan) for part in parts]
+    scores = [part.values.get(f"score{bracket}{team}", math.nan) for part in parts]
+    return len(set(filter(math.isfinite, values))) > 1 and (name == "score" or values != scores)
 
 
 def _estimate(mean: Mean) -> str:
@@ -379,7 +380,7 @@ def _estimate(mean: Mean) -> str:
 
 
 def _row(c: PairedComparison) -> Row:
-    numbers = (f"{n:,}" for n in (c.n, c.n_greater, c.n_less, c.n_equal))
+    numbers = (f"{n:,}" for n in (c.n_greater, c.n_less, c.n_equal))
     return "", [shown_name(c.quantity), estimate(c.difference, c.low, c.high), *numbers, f"{c.p:.3f}"]
 
 

@@ -45,7 +45,7 @@ class Travelled(Metric):
         self.east[w.team_numbers(w.team), w.world] = w.pos[0]
 
     def result(self, w):
-        return {"east": self.east, "score": self.east}
+        return {"east": self.east, "west": -self.east, "score": self.east}
 
 
 WAYS = {"Ada": (30.0, 3), "Ben": (-20.0, 1)}
@@ -125,8 +125,10 @@ def test_the_tables_have_what_differs_and_what_is_asked_for(tussle, folder, game
     assert ["games", "6", "6"] in lines
     assert ["orders", "3", "1"] in lines
     assert ["Waypoint", "18", "6"] in lines
-    assert any(line[:1] == ["Travelled.east"] for line in lines)
-    assert not any(line[:1] == ["SimpleCollision"] for line in lines)
+    assert any(line[:1] == ["Travelled.west"] for line in lines)
+    assert not any(
+        line[:1] in (["alive"], ["Travelled.score"]) for line in lines
+    )  # the same in all games, or the score
     lines = [line.split() for line in tussle("analyze", "first", "--quantity", "alive").stdout.splitlines()]
     assert ["alive", "1", "1"] in lines
     assert not any(line[:1] == ["orders"] for line in lines)
