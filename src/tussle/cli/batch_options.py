@@ -273,7 +273,7 @@ class AnalyzeOptions:
     directories: Annotated[
         list[Path],
         argument(
-            "BATCH|RUN...",
+            "BATCH|RUN",
             "A batch directory, complete or not; a run directory; or several runs, or folders of runs, whose operators are compared.",
         ),
     ]
