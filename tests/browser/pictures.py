@@ -24,6 +24,7 @@ from tussle.stock import SingleIntegrator
 from tussle.stress import Monitor, Specification
 from tussle.view import Live, Recording
 from tussle.view.export.html import write_html
+from tussle.view.page.access import PageRole
 from tussle.view.page.compare import Comparison
 from tussle.view.page.server import Page
 
@@ -185,6 +186,29 @@ def seek(watched: Watched, t: float) -> None:
     watched.wait(f"Math.abs(player.t - {t}) < 1e-6 && player.isDrawn")
 
 
+def experiment(browser: Browser) -> None:
+    """What Ada sees in the experiment with people, when two of her boats are on their way."""
+    loaded = read_mission(IMAGES.parents[1] / "examples/experiment/buoys.xml")
+    with (
+        Simulation(loaded.mission, 1) as simulation,
+        Live(simulation, is_paused=True, viewer=loaded.viewer) as live,
+        Page(live, operators={"Ada": 1}) as page,
+    ):
+        for boat, x, y in ((1, -25.0, -45.0), (2, 40.0, -40.0)):
+            live.order([boat], "LocalNetwork", "Waypoint", {"pos": [x, y, 0.0]})
+        live.step(45)
+        address = page.addresses[PageRole("operate", 1, "Ada")]
+        watched = Watched(browser, page, {"width": 1100, "height": 800}, address)
+        watched.wait("player.frame === 45")
+        for key in ("Escape", "ArrowRight", "ArrowRight", "ArrowRight", "o"):
+            watched.press(key)
+        watched.wait("player.status.entity && player.chosen === 3")
+        for part, value in zip("xyz", ("5", "-45", "0"), strict=True):
+            watched.tab.get_by_label(f"pos {part}", exact=True).fill(value)
+        shoot(watched, "experiment")
+        watched.close()
+
+
 class Hesitant(Autonomy):
     """The plugin of docs/view.md, with more places to think about."""
 
@@ -263,6 +287,7 @@ HILLS = """<runscript name="Crates on hills"><run dt="0.1" end="60"/>
 PICTURES: dict[str, Callable[[Browser], None]] = {
     "chase": chase,
     "alarms": alarms,
+    "experiment": experiment,
     "two-runs": two_runs,
     "replay": replay,
     "narrow": narrow,

@@ -27,19 +27,22 @@ class Watched:
         browser: The browser.
         page: The page that is served.
         size: Of the window.
+        url: Address that is opened; by default that of who may do everything.
     """
 
-    def __init__(self, browser: Browser, page: Page, size: dict[str, int] | None = None) -> None:
+    def __init__(
+        self, browser: Browser, page: Page, size: dict[str, int] | None = None, url: str = ""
+    ) -> None:
         self.page = page
         self.trouble: list[str] = []
         self.tab: Tab = browser.new_page(viewport=size or SMALL, reduced_motion="reduce")
         self.tab.set_default_timeout(90_000)
-        self._listen()
-        self.tab.goto(page.url)
+        self._listen(url or page.url)
+        self.tab.goto(url or page.url)
         self.wait(READY)
 
-    def _listen(self) -> None:
-        tab, url = self.tab, self.page.url
+    def _listen(self, url: str) -> None:
+        tab = self.tab
 
         def hear(message) -> None:
             if message.type in ("error", "warning") and not any(text in message.text for text in HARMLESS):

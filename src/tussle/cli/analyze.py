@@ -19,10 +19,12 @@ from tussle.batch.statistics import PairedComparison, Share
 from tussle.batch.variables import Range, Variable
 from tussle.cli.batch import answer_tables, short_names
 from tussle.cli.batch_options import AnalyzeOptions, ReportOptions
+from tussle.cli.operators import analyze_operators, is_folder_of_runs
 from tussle.cli.orders import analyze_orders, is_run
 from tussle.cli.progress import home_short
 from tussle.cli.tables import Cell, Row, indented, number_tables, title
 from tussle.cli.terminal import out, put, say_note
+from tussle.errors import ParameterError
 
 MAX_POINTS = 20
 MAX_FAILURES = 10
@@ -47,26 +49,33 @@ def report(options: ReportOptions) -> None:
 
 
 def analyze(options: AnalyzeOptions) -> None:
-    """Print the analysis of a batch, or of the orders in a recorded run.
+    """Print the analysis of a batch, of the orders in a recorded run, or of the operators of several.
 
     Raises:
         BatchError: The directory holds no batch.
-        RecordError: The run cannot be read.
-        ParameterError: There is no such quantity or point, or an option is for batches.
+        RecordError: A run cannot be read.
+        ParameterError: There is no such quantity or point, an option is for batches, or directories cannot be compared.
     """
-    if is_run(options.directory):
+    directory = options.directories[0]
+    are_several = len(options.directories) > 1 or is_folder_of_runs(directory)
+    if are_several or is_run(directory):
         of_batches = {
-            "--quantity": options.quantities,
+            "--quantity": options.quantities and not are_several,
             "--compare": options.compare,
             "--target": options.target,
             "--over": options.over,
             "--by-point": options.by_point,
         }
-        given = [name for name, value in of_batches.items() if value]
-        analyze_orders(options.directory, options.as_json, given)
+        if given := [name for name, value in of_batches.items() if value]:
+            what = "and the others are recorded runs" if are_several else "is a recorded run"
+            raise ParameterError(f"{directory} {what}, and {given[0]} is for batches")
+        if are_several:
+            analyze_operators(options.directories, options.quantities, options.as_json)
+        else:
+            analyze_orders(directory, options.as_json)
         return
     compare = [options.compare] if options.compare else []
-    results = load_batch(options.directory)
+    results = load_batch(directory)
     found = analyse(results, options.quantities, compare)
     if options.as_json:
         answers = results.answers(options.target, options.over)

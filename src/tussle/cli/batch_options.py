@@ -268,9 +268,15 @@ class StressOptions(ManyGamesOptions):
 
 @dataclass(frozen=True, kw_only=True)
 class AnalyzeOptions:
-    """Show who won a batch and how sure that is, how points differ, and which variables matter; of a run, who gave which orders."""
+    """Show who won a batch and how sure that is, how points differ, and which variables matter; of runs, who gave which orders."""
 
-    directory: Annotated[Path, argument("BATCH", "A batch directory, complete or not; or a run directory.")]
+    directories: Annotated[
+        list[Path],
+        argument(
+            "BATCH|RUN",
+            "A batch directory, complete or not; a run directory; or several runs, or folders of runs, whose operators are compared.",
+        ),
+    ]
     quantities: Annotated[
         list[str],
         option(

@@ -16,7 +16,7 @@ from rich.text import Text
 from tussle.cli.tables import Row, indented, number_tables, title
 from tussle.cli.terminal import put, say_note
 from tussle.declare.displays import counted
-from tussle.errors import ParameterError, clipped
+from tussle.errors import clipped
 from tussle.record.input_table import inputs_of
 from tussle.record.inputs import ExternalInput
 from tussle.record.run import Run, load_run
@@ -72,8 +72,8 @@ class Giver:
         }
 
 
-def givers_of(run: Run) -> list[Giver]:
-    """Who gave what in all worlds of a run, in the order of the names.
+def givers_of(run: Run, world: int | None = None) -> list[Giver]:
+    """Who gave what in one world of a run, or in all, in the order of the names.
 
     Raises:
         RecordError: An input is damaged.
@@ -81,27 +81,24 @@ def givers_of(run: Run) -> list[Giver]:
     found: dict[str, Giver] = {}
     table = run.inputs_table
     times = dict(zip(table["step"].to_pylist(), table["t"].to_pylist(), strict=True))
-    for world in sorted(set(table["world"].to_pylist())):
-        for given in inputs_of(table, world):
+    worlds = sorted(set(table["world"].to_pylist())) if world is None else [world]
+    for number in worlds:
+        for given in inputs_of(table, number):
             t = times[given.step]
-            found.setdefault(given.by, Giver(given.by, t, t)).add(world, t, given)
+            found.setdefault(given.by, Giver(given.by, t, t)).add(number, t, given)
     return [found[by] for by in sorted(found)]
 
 
-def analyze_orders(directory: Path, as_json: bool, others: Sequence[str]) -> None:
+def analyze_orders(directory: Path, as_json: bool) -> None:
     """Print who gave which orders in a recorded game.
 
     Args:
         directory: Directory of the run.
         as_json: Print JSON.
-        others: Options that were given and are for batches.
 
     Raises:
-        ParameterError: There are such options.
         RecordError: The run cannot be read.
     """
-    if others:
-        raise ParameterError(f"{directory} is a recorded run, and {others[0]} is for batches")
     run = load_run(directory, is_mapped=True)
     givers, name = givers_of(run), str(run.info.get("mission", {}).get("name", "") or directory.name)
     if as_json:
@@ -120,7 +117,7 @@ def analyze_orders(directory: Path, as_json: bool, others: Sequence[str]) -> Non
 
 
 def _tables(givers: Sequence[Giver]) -> Iterable[RenderableType]:
-    who = [_clipped(giver.by) or NOBODY for giver in givers]
+    who = [shown_name(giver.by) or NOBODY for giver in givers]
     rows: list[Row] = []
     for by, giver in zip(who, givers, strict=True):
         numbers = (
@@ -134,12 +131,12 @@ def _tables(givers: Sequence[Giver]) -> Iterable[RenderableType]:
     yield from number_tables(["", "orders", "entities", "first [s]", "last [s]"], rows)
     names = sorted({name for giver in givers for name in giver.names})
     counts: list[Row] = [
-        ("", [_clipped(name), *(f"{g.names[name] or ''}" for g in givers)]) for name in names
+        ("", [shown_name(name), *(f"{g.names[name] or ''}" for g in givers)]) for name in names
     ]
     yield indented(Text("which", "bold cyan"))
     yield from number_tables(["", *who], counts)
 
 
-def _clipped(name: str) -> str:
+def shown_name(name: str) -> str:
     """A name from a file, on one line and not long."""
     return clipped(" ".join(name.split()), MAX_NAME_SHOWN)

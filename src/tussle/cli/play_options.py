@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated
@@ -19,6 +20,7 @@ from tussle.cli.options import (
     flag,
     option,
 )
+from tussle.errors import MAX_SHOWN, clipped
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -230,11 +232,18 @@ class ViewOptions(AgainOptions, PageOptions):
     roles: Annotated[
         bool, flag("--roles", "Print further addresses: for watching only, and for orders to one team.")
     ] = False
+    operator: Annotated[
+        list[str],
+        option(
+            "NAME=team N",
+            "Print an address for somebody who gives orders to a team; their orders have this name. Can be repeated.",
+        ),
+    ] = field(default_factory=list)
     link: Annotated[
         str | None,
         option(
-            "delay=S,loss=P,bandwidth=B",
-            "Let orders come later [s], be lost with a probability, or share a bandwidth [bytes/s].",
+            "delay=S,loss=P,bandwidth=B,see=S",
+            "Let orders come later [s], be lost with a probability, or share a bandwidth [bytes/s]; show the game later [s].",
         ),
     ] = None
     spec: Annotated[
@@ -263,6 +272,22 @@ class ViewOptions(AgainOptions, PageOptions):
         if self.margin is not None and not self.spec:
             raise typer.BadParameter("--margin is allowed with --spec only")
         check_positive(margin=self.margin)
+        if len(self.operators) < len(self.operator):
+            raise typer.BadParameter("--operator: a name is given twice")
+
+    @property
+    def operators(self) -> dict[str, int]:
+        """Name -> team of who operates one."""
+        return dict(map(_operator, self.operator))
+
+
+def _operator(text: str) -> tuple[str, int]:
+    found = re.fullmatch(r"(.*)= *team +(-?[0-9]{1,10})", text)
+    if not found:
+        raise typer.BadParameter(
+            f"--operator {clipped(text, MAX_SHOWN)!r} is not allowed; it takes a name and a team: 'Ada=team 1'"
+        )
+    return found[1], int(found[2])
 
 
 @dataclass(frozen=True, kw_only=True)

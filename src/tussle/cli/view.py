@@ -19,6 +19,7 @@ from tussle.mission import Mission
 from tussle.pacing import POLL_PERIOD
 from tussle.view.link import OperatorLink
 from tussle.view.live import Live
+from tussle.view.page.access import operator_roles
 from tussle.view.page.compare import Comparison
 from tussle.view.page.server import Page
 from tussle.view.recording import Recording
@@ -43,6 +44,7 @@ def view(options: ViewOptions) -> int:
         options.read() if planned is None else (planned.loaded, planned.mission, planned.seed)
     )
     viewer = loaded.viewer
+    operator_roles(options.operators, {block.team for block in mission.blocks})
     watchings = watchings_of(options.spec, mission)
     with ExitStack() as stack:
         with compiling():
@@ -76,7 +78,15 @@ def view(options: ViewOptions) -> int:
             margin=1.0 if options.margin is None else options.margin,
         )
         stack.callback(live.stop)
-        page = stack.enter_context(Page(live, host=options.host, port=options.port, has_roles=options.roles))
+        page = stack.enter_context(
+            Page(
+                live,
+                host=options.host,
+                port=options.port,
+                has_roles=options.roles,
+                operators=options.operators,
+            )
+        )
         announce(page, options)
         speed = Speed(began)
         speed.begin(float(simulation.t[0]))

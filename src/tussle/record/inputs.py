@@ -61,16 +61,24 @@ def given_by(name: str) -> Generator[None]:
     Raises:
         ParameterError: It is not.
     """
-    given: Any = name  # programs without type checks pass anything
-    if not (isinstance(given, str) and given.isprintable() and len(given) <= MAX_NAME):
-        raise ParameterError(
-            f"given_by: {name!r:.{MAX_NAME}} is not allowed; it takes a printable text of at most {MAX_NAME} characters"
-        )
+    check_giver("given_by", name)
     token = GIVER.set(name)
     try:
         yield
     finally:
         GIVER.reset(token)
+
+
+def check_giver(where: str, name: Any) -> None:
+    """Check the name of who gives what comes from outside; programs without type checks pass anything.
+
+    Raises:
+        ParameterError: It is no printable text, or too long.
+    """
+    if not (isinstance(name, str) and name.isprintable() and len(name) <= MAX_NAME):
+        raise ParameterError(
+            f"{where}: {name!r:.{MAX_NAME}} is not allowed; it takes a printable text of at most {MAX_NAME} characters"
+        )
 
 
 InputListener = Callable[[int, ExternalInput], None]

@@ -166,8 +166,8 @@ class Run:
         return self._frame(self.links_table)
 
     @cached_property
-    def summary(self) -> Any:
-        """One row per world and team, as a frame.
+    def summary_table(self) -> pa.Table:
+        """One row per world and team.
 
         Raises:
             RecordError: The summary cannot be read, or is missing because the run was not closed.
@@ -182,7 +182,16 @@ class Run:
             raise RecordError(f"{path}: cannot be read: {error}") from None
         if lacking := [name for name in SUMMARY.column_types if name not in table.column_names]:
             raise RecordError(f"{path}: column {lacking[0]!r} is missing; {listed(table.column_names)}")
-        return self._frame(table)
+        return table
+
+    @cached_property
+    def summary(self) -> Any:
+        """One row per world and team, as a frame.
+
+        Raises:
+            RecordError: See `summary_table`.
+        """
+        return self._frame(self.summary_table)
 
     @property
     def mission(self) -> str | None:

@@ -1,4 +1,4 @@
-"""A slow link that loses orders, between the people who give them and the game."""
+"""A slow link between people and the game: orders come late or are lost, and what is seen is late."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from tussle.numeric.rng import stream_key, uniform
 from tussle.record.run_file import plain
 
 LOSS = stream_key("operator", "link", "loss")
-RULES = {"delay": Real(0.0, 1e6), "loss": Real(0.0, 1.0), "bandwidth": Real(1e-3)}
+RULES = {"delay": Real(0.0, 1e6), "loss": Real(0.0, 1.0), "bandwidth": Real(1e-3), "see": Real(0.0, 600.0)}
 
 
 @dataclass(frozen=True)
 class OperatorLink:
-    """How orders come from people to the game: later, one after the other, or not at all.
+    """How orders come from people to the game: later, one after the other, or not at all; and how late people see the game.
 
     An order is sent after those before it. It takes its bytes over the bandwidth, then the delay, and comes before the next step.
     Whether it is lost is drawn from the seed of the world and the order's number.
@@ -30,6 +30,7 @@ class OperatorLink:
         delay: Time that an order takes [s].
         loss: Probability that it is lost. That an entity is given back to its autonomies is never lost.
         bandwidth: Bytes that are sent in a second; inf for any number. An order has the bytes of its JSON text.
+        see: Age of what the page shows [s].
 
     Raises:
         ParameterError: A value is not allowed.
@@ -38,6 +39,7 @@ class OperatorLink:
     delay: float = 0.0
     loss: float = 0.0
     bandwidth: float = math.inf
+    see: float = 0.0
 
     def __post_init__(self) -> None:
         for name, rule in RULES.items():
@@ -68,7 +70,8 @@ class OperatorLink:
     def __str__(self) -> str:
         wide = "" if self.bandwidth == math.inf else f" and share {self.bandwidth:g} bytes/s"
         lost = f"; {100 * self.loss:g} % of them are lost" if self.loss else ""
-        return f"orders take {self.delay:g} s{wide}{lost}"
+        late = f"; what is seen is {self.see:g} s old" if self.see else ""
+        return f"orders take {self.delay:g} s{wide}{lost}{late}"
 
 
 class Underway:

@@ -74,6 +74,9 @@ class Live:
         specifications: Monitors of the simulation, made before its first step, see `tussle.stress.Monitor`.
         margin: Distance from failure below which there is an alarm, in the SI unit of what a specification compares.
 
+    Attributes:
+        see: Age of what a page shows, by the link [s]. The observations here are of the present.
+
     Raises:
         ParameterError: A value is not allowed.
     """
@@ -106,6 +109,7 @@ class Live:
         self._clock = simulation.state.context.clock
         self._collector = DrawCollector(simulation, world)
         self._pace = Pace(checked_warp(pace))
+        self.see = 0.0 if link is None else link.see
         alarms = SpecificationAlarms(specifications, margin, world, self.time_of)
         self._player = Player(simulation, world, snapshot_every, 1e6 * memory, alarms, inputs, link)
         self._playback = PlaybackController(self._player, self._pace, self._collector, is_paused, self._renew)

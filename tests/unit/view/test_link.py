@@ -3,6 +3,7 @@
 import time
 
 import pytest
+from page_client import PageClient
 
 from tussle import Block, Mission, Recorder, Simulation
 from tussle.api import Autonomy, Field, Handle, Message, Output, State, Subscribe
@@ -11,6 +12,8 @@ from tussle.messages import ManualControl
 from tussle.record import given_by, load_inputs
 from tussle.stock import SingleIntegrator
 from tussle.view import Live, OperatorLink
+from tussle.view.page.seen import MAX_KEPT, SeenDetails, SeenGame, SeenMoment
+from tussle.view.page.server import Page
 
 DT = 0.1
 
@@ -182,12 +185,14 @@ def test_where_the_time_does_not_jump_orders_arrive():
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("delya=1", "there is no 'delya' (did you mean 'delay'?); there are: delay, loss, bandwidth"),
+        ("delya=1", "there is no 'delya' (did you mean 'delay'?); there are: delay, loss, bandwidth, see"),
         ("delay", "delay = '' is not a number"),
         ("delay=1,loss=x", "loss = 'x' is not a number"),
         ("loss=1.5", "loss = 1.5 is not allowed; it takes a number from 0 to 1"),
         ("delay=-1", "delay = -1.0 is not allowed"),
         ("bandwidth=0", "bandwidth = 0.0 is not allowed"),
+        ("see=-1", "see = -1.0 is not allowed"),
+        ("see=601", "see = 601.0 is not allowed"),
         ("delay=nan", "delay = nan is not allowed"),
         ("", "there is no ''"),
     ],
@@ -202,6 +207,7 @@ def test_a_link_in_words():
     assert str(OperatorLink.of_text(" delay=0.5 , loss=0.1,bandwidth=200")) == (
         "orders take 0.5 s and share 200 bytes/s; 10 % of them are lost"
     )
+    assert str(OperatorLink.of_text("see=1.5")) == "orders take 0 s; what is seen is 1.5 s old"
 
 
 @pytest.mark.parametrize("threaded", [False, True])
@@ -225,3 +231,106 @@ def test_orders_keep_the_name_of_who_gave_them_on_the_way_and_after_a_seek(tmp_p
         while live.step_number < 15:
             time.sleep(0.01)
     assert [each.by for each in load_inputs(tmp_path / "run")] == ["Ada", "", "Ben", "Ben"]
+
+
+def watch(live, page, client):
+    """Play a step on, and wait until the page has read it and shows what it is to show; returns the time that is shown [s]."""
+    live.step()
+    assert live.settle()
+    now = float(live.simulation.t[0])
+    client.wait(lambda: page.publisher._seen._kept[-1].t == now, 20.0)
+    seen = max(now - live.see, 0.0)
+    client.wait(lambda: abs(client.t - seen) < 1e-6 and abs(client.status.get("t", -1.0) - seen) < 1e-6, 20.0)
+    return client.t
+
+
+def test_what_people_see_is_late_in_the_time_of_the_game():
+    link = OperatorLink(see=0.5)
+    with (
+        Simulation(mission(), 1) as simulation, Live(simulation, is_paused=True, link=link) as live,
+        Page(live) as page, PageClient(page.url) as client,
+    ):  # fmt: skip
+        client.order("choose", id=2)
+        client.wait(lambda: client.status.get("entity") and client.status["entity"]["sections"])
+        live.publish(Go, receivers=[2], speed=5.0, note="go")
+        assert watch(live, page, client) == 0.0
+        start = client.frame[2].pos[0]
+        for _ in range(4):
+            assert watch(live, page, client) == 0.0
+        assert live.frame().pos[1, 0] > start + 1.0  # the present, which nobody sees
+        assert client.frame[2].pos[0] == start
+        assert watch(live, page, client) == pytest.approx(0.1)
+        assert watch(live, page, client) == pytest.approx(0.2)
+        client.wait(lambda: client.status["step"] == 2)
+        assert client.frame[2].pos[0] > start
+        assert all(row[0] <= 0.2 for row in client.events)
+        assert all(t <= 0.2 for changes in client.curves.values() for t, _ in changes)
+        # Of an entity that is chosen now there is nothing to be seen yet, but it takes orders.
+        client.order("choose", id=3)
+        client.wait(lambda: client.status["entity"] and client.status["entity"]["id"] == 3)
+        assert client.status["entity"]["sections"] == []
+        assert client.status["entity"]["orders"]
+        # A jump in time shows where it led to.
+        client.order("seek", t=0.4)
+        client.wait(lambda: abs(client.t - 0.4) < 1e-6)
+        assert page.error is None
+
+
+def test_the_end_of_a_game_is_seen_at_once_and_deaths_are_not_told_before():
+    link = OperatorLink(see=2.0)
+    short = Mission(blocks=mission().blocks, dt=DT, end=3.0)
+    with (
+        Simulation(short, 1) as simulation, Live(simulation, is_paused=True, link=link) as live,
+        Page(live) as page, PageClient(page.url) as client,
+    ):  # fmt: skip
+        client.wait(lambda: client.frame)
+        live.step(5)
+        live.remove([1])
+        for _ in range(5):
+            live.step(2)
+            assert live.settle()
+            client.wait(lambda: client.n_frames)
+        time.sleep(0.6)  # more than two statuses
+        assert 1 not in live.frame().id
+        assert 1 in client.frame
+        assert not client.status["isOver"]
+        assert not any("removed" in str(row) or row[1] == "death" for row in client.events)
+        live.step(100)
+        client.wait(lambda: client.status["isOver"])
+        client.wait(lambda: 1 not in client.frame and abs(client.t - 3.0) < 1e-6)
+        client.wait(lambda: any("death" in map(str, row) for row in client.events))
+        assert page.error is None
+
+
+def test_a_late_view_changes_neither_the_game_nor_its_recording(tmp_path):
+    hashes = set()
+    for name, see in (("now", 0.0), ("late", 1.0)):
+        with (
+            Simulation(mission(), 1) as simulation, Recorder(simulation, tmp_path / name),
+            Live(simulation, is_paused=True, link=OperatorLink(delay=0.2, see=see)) as live,
+            Page(live) as page, PageClient(page.url) as client,
+        ):  # fmt: skip
+            live.publish(Go, receivers=[2], speed=5.0, note="go")
+            live.step(15)
+            assert live.settle()
+            client.wait(lambda: client.status)
+            hashes.add(simulation.state_hash())
+        hashes.add(str(load_inputs(tmp_path / name)))
+    assert len(hashes) == 2
+
+
+def moment(t, epoch=0, frame=None):
+    return SeenMoment(t, round(t / DT), epoch, (0.0, t), False, frame, (), SeenDetails())
+
+
+def test_moments_on_their_way_are_few_and_late_by_the_delay():
+    seen, late = SeenGame(None), 7.0
+    for k in range(5000):
+        t = 0.01 * k
+        seen.keep(moment(t), late)
+        age = t - seen.now.t
+        assert late <= age <= late * (1.0 + 1.0 / MAX_KEPT) + 0.011 or seen.now.t == 0.0
+        assert len(seen._kept) <= MAX_KEPT + 2
+    assert seen.now.t > 42.0
+    seen.keep(moment(3.0, epoch=1), late)
+    assert seen.now.t == 3.0

@@ -7,6 +7,7 @@ import pytest
 from page_client import PageClient
 
 from tussle import Block, Mission, Simulation
+from tussle.errors import ParameterError
 from tussle.stock import GoTo, SingleIntegrator
 from tussle.view import Live
 from tussle.view.page.access import OPERATE, WATCH, PageRole
@@ -79,7 +80,7 @@ def test_nothing_else_is_done_from_the_other_addresses(page, role, command):
     with PageClient(page.addresses[role]) as client:
         client.wait(lambda: client.status and client.n_frames)
         assert not client.status["steers"]
-        assert client.status["role"] == {"kind": role.kind, "team": role.team}
+        assert client.status["role"] == {"kind": role.kind, "team": role.team, "name": ""}
         reason = refused(client, *command)
         is_order = bool({"receivers", "entities"} & set(command[1]))
         expected = (
@@ -165,3 +166,64 @@ def test_without_roles_there_is_one_address(page):
     live, _ = page
     with Page(live) as plain:
         assert list(plain.addresses.values()) == [plain.url]
+
+
+@pytest.fixture
+def people(page):
+    live, _ = page
+    with Page(live, has_roles=True, operators={"Ada": 1, "Ben": 1, "operate team 1": 2}) as page:
+        yield live, page
+        assert page.error is None
+
+
+def test_people_have_addresses_of_their_own_beside_those_of_roles(people):
+    _, page = people
+    named = ["Ada (operate team 1)", "Ben (operate team 1)", "operate team 1 (operate team 2)"]
+    roles = ["direct", *named, "operate team 1", "operate team 2", "watch"]
+    assert [str(role) for role in page.addresses] == roles
+    assert len(set(page.addresses.values())) == len(roles)
+    operators = [role for role in page.addresses if role.kind == OPERATE]
+    assert [PageRole.of_operator(str(role)) for role in operators] == operators
+    assert PageRole.of_operator("Ada") is PageRole.of_operator("operate team x") is None
+
+
+def test_orders_have_the_name_of_the_address(people):
+    live, page = people
+    orders = [(PageRole(OPERATE, 1, "Ada"), 1), (PageRole(OPERATE, 1, "Ben"), 2), (PageRole(OPERATE, 1), 1)]
+    heard = []
+    listener = lambda world, given: heard.append((given.by, given.to))  # noqa: E731
+    live.simulation.events.inputs.append(listener)
+    for n, (role, who) in enumerate(orders, 1):
+        with PageClient(page.addresses[role]) as client:
+            client.wait(lambda: client.status)
+            assert client.status["role"]["name"] == role.name
+            client.order("order", receivers=[who], by="Ben", **ORDER)  # no command of the page
+            assert refused(client, "order", {"receivers": [3], **ORDER}).startswith(
+                "entity 3 is not of team 1"
+            )
+            client.order("order", receivers=[who], **ORDER)
+            client.wait(lambda n=n: len(live.injections) == n)
+    live.step(1)
+    assert live.settle()
+    assert heard == [(str(role), (who,)) for role, who in orders]
+
+
+@pytest.mark.parametrize(
+    ("operators", "reason"),
+    [
+        ({"": 1}, "a name has no space at its ends"),
+        ({"Ada ": 1}, "a name has no space at its ends"),
+        ({"Ada\n": 1}, "it takes a printable text"),
+        ({"A" * 90: 1}, "it takes a printable text of at most 100"),
+        ({3: 1}, "it takes a printable text"),
+        ({"Ada": 3}, "'Ada' cannot operate team 3; there are: 1, 2"),
+        ({"Ada": "1"}, "'Ada' cannot operate team '1'"),
+        ({"Ada": 1, "ADA": 2}, "'ADA' and 'Ada' look alike"),
+        ({"ﬁn": 1, "fin": 2}, "'fin' and 'ﬁn' look alike"),
+    ],
+)
+def test_names_and_teams_of_people_are_checked(page, operators, reason):
+    live, _ = page
+    with pytest.raises(ParameterError, match=r"^operator: ") as caught:
+        Page(live, operators=operators)
+    assert reason in str(caught.value)

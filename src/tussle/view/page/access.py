@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import hmac
 import ipaddress
+import re
 import secrets
 import socket
-from collections.abc import Sequence
+import unicodedata
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Self
 
-from tussle.errors import ViewError
+from tussle.errors import ParameterError, ViewError, listed
+from tussle.record.inputs import check_giver
 
 LOOPBACK_NAMES = ("127.0.0.1", "localhost", "[::1]")
 EVERYWHERE = ("0.0.0.0", "::")  # noqa: S104 - they are compared, not bound
@@ -42,13 +46,50 @@ class PageRole:
     Attributes:
         kind: "direct": everything; "operate": give orders to the entities of a team; "watch": nothing that changes the game or its time.
         team: The team, of an operator.
+        name: Who has the address, of an operator; "" where anybody may have it.
     """
 
     kind: str = DIRECT
     team: int | None = None
+    name: str = ""
 
     def __str__(self) -> str:
-        return self.kind if self.team is None else f"{self.kind} team {self.team}"
+        role = self.kind if self.team is None else f"{self.kind} team {self.team}"
+        return f"{self.name} ({role})" if self.name else role
+
+    @classmethod
+    def of_operator(cls, text: str) -> Self | None:
+        """The role that has this text, of an operator; None for any other text."""
+        found = re.fullmatch(r"(?:(.+) \()?operate team (-?\d+)(?(1)\))", text)
+        return cls(OPERATE, int(found[2]), found[1] or "") if found else None
+
+
+def operator_roles(operators: Mapping[str, int], teams: Collection[int]) -> list[PageRole]:
+    """The roles of people who operate a team each.
+
+    Args:
+        operators: Name -> team.
+        teams: Teams of the game.
+
+    Raises:
+        ParameterError: A name is not allowed or looks like another one, or there is no such team.
+    """
+    roles: dict[str, PageRole] = {}
+    for name, team in operators.items():
+        check_giver("operator", name)
+        if not name or name != name.strip():
+            raise ParameterError(f"operator: {name!r} is not allowed; a name has no space at its ends")
+        if team not in list(teams):
+            raise ParameterError(
+                f"operator: {name!r} cannot operate team {team!r}; {listed(map(str, sorted(teams)))}"
+            )
+        role = PageRole(OPERATE, int(team), name)
+        check_giver("operator", str(role))
+        looks = unicodedata.normalize("NFKC", name).casefold()
+        if looks in roles:
+            raise ParameterError(f"operator: {name!r} and {roles[looks].name!r} look alike")
+        roles[looks] = role
+    return list(roles.values())
 
 
 class Access:

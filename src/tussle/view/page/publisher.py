@@ -6,6 +6,7 @@ import asyncio
 import json
 import math
 import time
+from bisect import bisect_right
 from collections import deque
 from collections.abc import Callable
 from dataclasses import asdict
@@ -31,6 +32,7 @@ from tussle.view.page.facts import mission_facts
 from tussle.view.page.failures import Failures
 from tussle.view.page.formatting import entity_sections, feed_rows, result_rows
 from tussle.view.page.packing import message
+from tussle.view.page.seen import SeenGame
 from tussle.view.series import OF_TEAMS, Changes, CurveName, StepSeries
 
 
@@ -83,6 +85,7 @@ class Reader:
         self.wake.set()
         self.frame_sent = self.drawn_sent = 0
         self.status_due = 0.0
+        self.is_due = False
         self.past: deque[bytes] = deque(maxlen=MAX_LOOKS)
         self.refusal: str | None = None
         self.refused_at = -REFUSAL_PERIOD
@@ -104,7 +107,8 @@ class Reader:
 class FramePublisher:
     """Encodes each frame once for all browsers. A browser gets the newest frame after it has read the previous one.
 
-    While nobody watches, the game is asked for nothing. All methods but `n_readers` are called in the server's loop.
+    While nobody watches, the game is asked for nothing, unless it is seen late. All methods but
+    `n_readers` are called in the server's loop.
 
     Args:
         live: The game.
@@ -123,7 +127,8 @@ class FramePublisher:
         self.readers: list[Reader] = []
         self.n_made = 0
         self._moments: deque[float] = deque(maxlen=64)
-        self._seen: tuple[Frame, int] | None = None
+        self._seen = SeenGame(live)
+        self._packed: tuple[Frame, int] | None = None
         self._frame = self._drawn = b""
         self._shapes: tuple[Any, ...] = ()
         self._n_drawn = 0
@@ -152,27 +157,39 @@ class FramePublisher:
         return step_of(scenery.low, scenery.high, smallest)
 
     async def run(self) -> None:
-        """Make frames while at least one browser is connected."""
+        """Make frames while at least one browser is connected, or while the game is seen late."""
         while True:
-            if self.readers:
+            is_needed = bool(self.readers) or self._live.see > 0.0
+            if is_needed:
                 with self._failures.caught():
+                    self._look()
                     self._make_frame()
                 with self._failures.caught():
                     self._make_drawing()
                 for reader in self.readers:
                     reader.wake.set()
-            await asyncio.sleep(self._period if self.readers else POLL_PERIOD)
+            await asyncio.sleep(self._period if is_needed else POLL_PERIOD)
+
+    def _look(self) -> None:
+        """Read the game, with details where they are to be sent now."""
+        for reader in self.readers:
+            reader.is_due = reader.is_due or time.monotonic() >= reader.status_due
+        self._seen.look(
+            {reader.chosen for reader in self.readers if reader.chosen},
+            has_feed=any(reader.has_feed for reader in self.readers),
+            has_details=any(reader.is_due for reader in self.readers),
+        )
 
     def _make_frame(self) -> None:
-        frame, epoch = self._live.frame(), self._live.epoch
-        if self._seen is None or frame is not self._seen[0] or epoch != self._seen[1]:
-            self._seen = frame, epoch
+        frame, epoch = self._seen.now.frame, self._seen.now.epoch
+        if self._packed is None or frame is not self._packed[0] or epoch != self._packed[1]:
+            self._packed = frame, epoch
             self._frame = message({"kind": "frame", "epoch": epoch}, pack(frame.step, [frame], self._step))
             self.n_made += 1
             self._moments.append(time.monotonic())
 
     def _make_drawing(self) -> None:
-        shapes = self._live.shapes()
+        shapes = self._seen.now.shapes
         if len(shapes) == len(self._shapes) and all(
             a is b for a, b in zip(shapes, self._shapes, strict=True)
         ):
@@ -194,6 +211,8 @@ class FramePublisher:
     async def _serve(self, reader: Reader, socket: Socket) -> None:
         """Send and take."""
         self.readers.append(reader)
+        with self._failures.caught():
+            self._look()
         sender = asyncio.create_task(self._send(reader))
         try:
             while not socket.closed:
@@ -218,7 +237,8 @@ class FramePublisher:
             while True:
                 await reader.wake.wait()
                 reader.wake.clear()
-                if time.monotonic() >= reader.status_due:
+                if reader.is_due:
+                    reader.is_due = False
                     reader.status_due = time.monotonic() + STATUS_PERIOD
                     await self._send_document(socket, lambda: self._status(reader))
                 while reader.past:
@@ -244,30 +264,31 @@ class FramePublisher:
             await socket.send_str(text)
 
     def _status(self, reader: Reader) -> dict[str, Any]:
-        live, result = self._live, self._live.result()
+        live, seen = self._live, self._seen.now
+        result = seen.details.result
         refusal, reader.refusal = reader.refusal, None
         warp = live.warp
         error = live.error
         now = time.monotonic()
         return {
-            "kind": "status", "t": live.t, "step": live.step_number, "span": live.span, "epoch": live.epoch, "seed": live.seed,
-            "isPaused": live.is_paused, "isOver": live.is_over, "isSeeking": live.is_seeking,
+            "kind": "status", "t": seen.t, "step": seen.step, "span": seen.span, "epoch": seen.epoch, "seed": live.seed,
+            "isPaused": live.is_paused, "isOver": seen.is_over, "isSeeking": live.is_seeking,
             "warp": None if math.isinf(warp) else warp, "reached": live.warp_reached,
             "rate": sum(now - moment <= 1.0 for moment in self._moments),
             "notes": [*live.notes, *self._drawing_notes, *self._failures.texts], "error": None if error is None else str(error),
             "metrics": [] if result is None else result_rows(result, live.teams), "events": self._new_events(reader),
             "entity": self._entity(reader), "refusal": refusal, "steers": self._may_steer(reader),
-            "role": {"kind": reader.role.kind, "team": reader.role.team},
-            "feed": feed_rows(live.messages()) if reader.has_feed else None,
+            "role": asdict(reader.role),
+            "feed": feed_rows(seen.details.feed) if reader.has_feed else None,
             "alarms": [
                 {k: None if isinstance(v, float) and not math.isfinite(v) else v for k, v in asdict(each).items()}
-                for each in live.alarms()
+                for each in seen.details.alarms
             ],
         }  # fmt: skip
 
     def _new_events(self, reader: Reader) -> dict[str, Any]:
         """Return the events that a browser does not have yet, and how many of the earlier ones are still valid."""
-        events, sent = self._live.events, reader.events_sent
+        events, sent = self._seen.events(), reader.events_sent
         n = len(sent)
         if events[:n] != sent:  # an alarm is older than what came after it, for example
             pairs = enumerate(zip(events, sent, strict=False))
@@ -289,7 +310,8 @@ class FramePublisher:
             if not is_shown and (quantity.name, quantity.id) not in reader.wanted:
                 continue
             sent, n_sent = reader.changes_sent.get(quantity, (None, 0))
-            start, end = n_sent if sent is each else 0, len(each.values)
+            start = n_sent if sent is each else 0
+            end = max(start, bisect_right(each.steps, self._seen.last_step()))
             if (start == end and sent is each) or sum(len(c.t) for c in changes) > MAX_CHANGES:
                 continue
             reader.changes_sent[quantity] = each, end
@@ -315,14 +337,16 @@ class FramePublisher:
         )
 
     def _entity(self, reader: Reader) -> dict[str, Any] | None:
-        state = self._live.entity(reader.chosen) if reader.chosen else None
+        who, seen = reader.chosen, self._seen.now.details.entities
+        state = seen.get(who) or self._live.entity(who) if who else None
         if state is None:
             return None
         quantities = [[name, unit] for name, (_, unit) in numbers_of(state).items()]
         orders = [asdict(kind) for kind in state.orders]
         return {
             "id": state.id,
-            "sections": entity_sections(state),
+            # Of one that was chosen after what is seen now, only what does not change.
+            "sections": entity_sections(state) if seen.get(who) or not self._seen.is_late else [],
             "quantities": quantities,
             "orders": orders,
             "axes": state.axes,
@@ -410,8 +434,7 @@ class FramePublisher:
 
     def _look_back(self, reader: Reader, seconds: float) -> None:
         """Send frames of the last seconds, as many as the trails need."""
-        live = self._live
-        now = live.frame()
+        live, now = self._live, self._seen.now.frame
         n = max(2, min(PAST_FRAMES, PAST_STATES // max(len(now), 1)))
         frames = {
             f.step: f for f in map(live.frame_at, np.linspace(max(now.t - seconds, live.span[0]), now.t, n))

@@ -23,6 +23,7 @@ from tussle.view.page.access import (
     Access,
     PageRole,
     bound_socket,
+    operator_roles,
 )
 from tussle.view.page.assemble import page_html
 from tussle.view.page.compare import Comparison
@@ -59,6 +60,7 @@ class Page:
         is_paused: Whether a recorded game stands still at first.
         one_steers: Of a live game, only the browser that came first steers it; otherwise all do.
         has_roles: A live game has further addresses: for watching only, and for orders to each of its teams.
+        operators: Name -> team of people who operate a team of a live game; each has an address, and orders from there have this name.
 
     Attributes:
         game: The game.
@@ -72,6 +74,7 @@ class Page:
     Raises:
         MissingExtraError: aiohttp is not installed.
         ViewError: It cannot be served there, or there is nothing to show.
+        ParameterError: An operator's name or team is not allowed.
     """
 
     def __init__(
@@ -86,10 +89,12 @@ class Page:
         is_paused: bool = False,
         one_steers: bool = False,
         has_roles: bool = False,
+        operators: Mapping[str, int] | None = None,
     ) -> None:
         _check_extra()
         self.game, self.host = game, host or LOOPBACK
         self._failures = Failures()
+        roles = _roles(game, has_roles, operators or {}) if isinstance(game, Live) else []
         viewer = dict(game.viewer if viewer is None else viewer)
         notes: list[str] = []
         self._data: RecordedData | None = None
@@ -112,10 +117,7 @@ class Page:
         bound = bound_socket(self.host, port)
         address, self.port = bound.getsockname()[:2]
         self.is_local = ipaddress.ip_address(address).is_loopback
-        roles = (
-            [PageRole(OPERATE, team) for team in game.teams] if has_roles and isinstance(game, Live) else []
-        )
-        self._access = Access(self.host, self.port, [*roles, PageRole(WATCH)] if roles else [])
+        self._access = Access(self.host, self.port, roles)
         self.url, self.addresses = self._access.url, self._access.addresses
         publisher = self.publisher
         self._server: WebServer | None = None
@@ -205,6 +207,13 @@ class Page:
 
     def __exit__(self, *_: object) -> None:
         self.stop()
+
+
+def _roles(game: Live, has_roles: bool, operators: Mapping[str, int]) -> list[PageRole]:
+    """The roles besides the one that may do everything."""
+    named = operator_roles(operators, game.teams)
+    unnamed = [*(PageRole(OPERATE, team) for team in game.teams), PageRole(WATCH)] if has_roles else []
+    return [*named, *unnamed]
 
 
 def _check_extra() -> None:

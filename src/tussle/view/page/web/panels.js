@@ -81,7 +81,7 @@ export class Panels {
    */
   showStatus({ step, reached, rate, seed, isPaused, isOver, isSeeking, error, notes, metrics, steers, role }, drawRate) {
     const state = isSeeking ? 'seeking' : isOver ? 'over' : isPaused ? 'paused' : `${Number(reached.toPrecision(2))}× real time`;
-    const parts = [`seed ${seed}`, `step ${number(step)}`, state, ...(rate && !isPaused ? [`${Number(drawRate.toPrecision(2))} frames/s`, `${rate} states/s sent`] : []), !steers && { direct: 'another browser steers', operate: `you operate team ${role.team}`, watch: 'you watch' }[role.kind]];
+    const parts = [`seed ${seed}`, `step ${number(step)}`, state, ...(rate && !isPaused ? [`${Number(drawRate.toPrecision(2))} frames/s`, `${rate} states/s sent`] : []), !steers && { direct: 'another browser steers', operate: `${role.name && `${role.name}, `}you operate team ${role.team}`, watch: 'you watch' }[role.kind]];
     say(byId('subtitle'), parts.filter(Boolean).join(' · '));
     this.showNotes([...new Set([...(error ? [error] : []), ...this.page.notes, ...notes])]);
     if (error) this.notice(error, true);
