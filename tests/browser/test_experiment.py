@@ -8,7 +8,7 @@ import subprocess
 import pytest
 from cli_process import COMMAND, environment
 from contrast import faint_texts
-from experiment_people import FIRST, LAST, MISSION, N_ORDERS, WAYS, check_figures, games, printed
+from experiment_people import FIRST, MISSION, N_ORDERS, WAYS, check_figures, games, play_without_page, printed
 from pages import ROOT
 from served import READY
 from waiting import wait_until
@@ -50,8 +50,14 @@ def check_looks(tab, name):
         assert not faint_texts(tab, behind)
 
 
+def press(leader, is_paused):
+    """Let the game wait, or go on."""
+    leader.keyboard.press("Space")
+    wait_until(leader, f"player.status && player.status.isPaused === {str(is_paused).lower()}")
+
+
 def play(chromium, command, folder):
-    """Play a game of the page as one person, with a leader who lets it begin; returns the person, and what was printed."""
+    """Play a game of the page as one person, with a leader who lets it wait; returns the person, and what was printed."""
     process = subprocess.Popen(
         [*COMMAND, *shlex.split(command)[1:], "--no-browser"],
         cwd=folder, env=environment(), stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
@@ -73,18 +79,18 @@ def play(chromium, command, folder):
         begin = chromium.new_page(viewport={"width": 300, "height": 200})
         begin.goto(leader)
         wait_until(begin, READY)
-        begin.keyboard.press("Space")
-        wait_until(begin, "player.status && !player.status.isPaused")
-        begin.close()
-        wait_until(tab, f"player.status.t >= {FIRST}", 300.0)
+        press(begin, is_paused=False)
+        wait_until(begin, f"player.status.t >= {FIRST}", 300.0)
+        press(begin, is_paused=True)
         for each in second:
             order(tab, *each)
-        assert tab.evaluate("() => player.status.t") < LAST, (
-            "the last orders came too late: the machine is too busy"
-        )
+        press(begin, is_paused=False)
+        for _ in range(4):
+            begin.keyboard.press("]")
         process.communicate(timeout=300)
         assert process.returncode == 0
         tab.close()
+        begin.close()
     finally:
         process.kill()
         process.communicate(timeout=60)
@@ -99,7 +105,9 @@ def without_secrets(text):
 @pytest.mark.slow
 def test_the_experiment_of_the_page(chromium, tmp_path):
     shutil.copytree((ROOT / MISSION).parent, (tmp_path / MISSION).parent)
-    for number, command in enumerate(games()):
+    for command in games()[2:]:  # their figures; a game at the page takes almost a minute
+        play_without_page(command, tmp_path)
+    for number, command in enumerate(games()[:2]):
         name, lines = play(chromium, command, tmp_path)
         if number == 0:
             assert without_secrets(lines) == without_secrets(printed(command))
