@@ -1,8 +1,8 @@
 """Changes of the random key during a game: from a step on, a world draws with another key.
 
 A game is its mission, its seed and its re-keys. One with other re-keys from step k on is a branch: the same game up to the state at the
-start of step k, and then other luck. A re-key with a target is for some of the draws only: those of a block, of one entity, of one plugin, or
-of one of its labels. The last re-key that a draw is named by counts, so that one of the whole world ends those before it.
+start of step k, and then other luck. A re-key with a target is for some draws only: those of a block, an entity, a plugin or a label.
+Of several that name a draw, the last one counts: one of the whole world ends those before it.
 """
 
 from __future__ import annotations
@@ -52,7 +52,9 @@ class Target(NamedTuple):
         Raises:
             MissionError: It is no target.
         """
-        owner, number, plugin, label, *more = [*map(unquote, text.split("/")), *[""] * 3][: max(4, text.count("/") + 1)]
+        owner, number, plugin, label, *more = [*map(unquote, text.split("/")), *[""] * 3][
+            : max(4, text.count("/") + 1)
+        ]
         if not owner or more or not re.fullmatch(r"\d{0,9}", number, re.ASCII):
             raise MissionError(f"target {shown(text)} of a re-key is not allowed; {TARGET}")
         return cls(owner, int(number or 0), plugin, label)
@@ -69,19 +71,19 @@ def checked_rekeys(value: Any) -> Rekeys:
         MissionError: They are not in order of their steps, or a number or target is not allowed.
     """
     try:
-        rekeys = tuple((_whole(step), _whole(key), *map(_target, target)) for step, key, *target in value)
+        rekeys: Rekeys = tuple(
+            (_whole(step), _whole(key), *map(_target, target))  # type: ignore[misc]
+            for step, key, *target in value
+        )
     except MissionError:
         raise
     except (TypeError, ValueError):
         raise MissionError(f"rekeys = {value!r:.80} is not allowed; {TAKES}") from None
-    order = [(step, *target) for step, _, *target in rekeys]
-    if (
-        order != sorted(set(order))
-        or not all(0 <= s <= MAX_STEP and 0 <= k <= MAX_KEY for s, k, *_ in rekeys)
-        or any(len(place) > 2 for place in order)
-    ):
+    order = [(each[0], *each[2:]) for each in rekeys]
+    is_wrong = order != sorted(set(order)) or any(len(place) > 2 for place in order)
+    if is_wrong or not all(0 <= each[0] <= MAX_STEP and 0 <= each[1] <= MAX_KEY for each in rekeys):
         raise MissionError(f"rekeys = {value!r:.80} is not allowed; {TAKES}")
-    return rekeys  # type: ignore[return-value]
+    return rekeys
 
 
 def _target(value: Any) -> str:
@@ -90,9 +92,7 @@ def _target(value: Any) -> str:
     return str(Target.parse(value))
 
 
-def check_targets(
-    rekeys: Rekeys, blocks: Mapping[str, Sequence[str]], world_plugins: Sequence[str]
-) -> None:
+def check_targets(rekeys: Rekeys, blocks: Mapping[str, Sequence[str]], world_plugins: Sequence[str]) -> None:
     """Check that the targets of re-keys exist. Labels are known only where they are drawn.
 
     Args:
@@ -110,7 +110,9 @@ def check_targets(
             if owner in blocks:
                 known, wrong = ["", *blocks[owner], *world_plugins], plugin
             elif owner in known and (number or plugin not in ("", owner)):
-                raise MissionError(f"rekeys: {clipped(owner)} is a world plugin, of which there are no entities; {TARGET}")
+                raise MissionError(
+                    f"rekeys: {clipped(owner)} is a world plugin, of which there are no entities; {TARGET}"
+                )
             if wrong not in known:
                 names = [name for name in known if name]
                 raise MissionError(

@@ -416,7 +416,8 @@ class Mission:
     def draws(self) -> tuple[dict[str, list[str]], list[str]]:
         """Who draws random numbers: block -> names of its plugins, and the world plugins."""
         names = [
-            [each.instance_name for plugin in outer.plugins for each in plugin.walk()] for outer in self.blocks
+            [each.instance_name for plugin in outer.plugins for each in plugin.walk()]
+            for outer in self.blocks
         ]
         of_blocks = dict(zip([block.name for block in self.blocks], names, strict=True))
         return of_blocks, [p.instance_name for p in self.world_plugins]

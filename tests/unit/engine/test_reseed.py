@@ -247,7 +247,9 @@ def test_a_rekey_with_a_target_changes_its_draws_alone(target, entities, lots, c
     stack = Simulation(game, [4, 5, 1])
     stack.reset([0, 2], [4, 1], rekeys=[((0, 3, "a"),), ((2, 9, target), (4, 11))])
     found = of_targets(stack)
-    for got, alone in zip(found, of_targets(Simulation(game.replace(rekeys=((2, 9, target), (4, 11))), [1])), strict=True):
+    for got, alone in zip(
+        found, of_targets(Simulation(game.replace(rekeys=((2, 9, target), (4, 11))), [1])), strict=True
+    ):
         np.testing.assert_array_equal(got, alone)
     for values, was, chosen in zip(found[:2], whole[:2], (entities, lots), strict=True):
         is_new = np.zeros((2, 4), bool)
@@ -274,7 +276,7 @@ def test_targets_of_a_mission_file(tmp_path):
     ("rekeys", "message"),
     [
         ([(4, 7, "b")], "there is no block or plugin 'b'; "),
-        ([(4, 7, "a//Drawz")], "there is no block or plugin 'Drawz'; did you mean 'Draws'"),
+        ([(4, 7, "a//Drawz")], "there is no block or plugin 'Drawz' .did you mean 'Draws'"),
         ([(4, 7, "WorldDraws/2")], "WorldDraws is a world plugin, of which there are no entities"),
         ([(4, 7, "a/x")], "target 'a/x' of a re-key is not allowed"),
         ([(4, 7, "")], "target '' of a re-key is not allowed"),
