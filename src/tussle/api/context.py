@@ -22,6 +22,27 @@ PARTS_PER_THREAD = 4
 """Parts that `Context.split` makes for each thread: a slow thread then delays the others less."""
 
 
+@dataclass(frozen=True)
+class Redraw:
+    """Some draws of a world that have a key of their own.
+
+    Attributes:
+        world: The world.
+        key: Their key.
+        block: Number of the block for whose entities they are; -1 for those of a world plugin for its world.
+        index: Index of the entity in the block; -1 for all.
+        plugin: Instance name of the plugin that draws; "" for all.
+        label: Label of the draws; "" for all.
+    """
+
+    world: int
+    key: np.uint64
+    block: int
+    index: int
+    plugin: str
+    label: str
+
+
 @dataclass
 class Context:
     """Data shared by all views of a simulation.
@@ -49,6 +70,8 @@ class Context:
         steady_steps: This number where rows stay the same for long, and where they do not: to pack takes as long as ten steps save.
         later: What `GroupView.finish` is called with, where the calls of kernels are recorded.
         is_interrupted: Whether the user asked to stop; a plugin that waits for others then waits no longer.
+        redraws: Draws with keys of their own; of several that name a draw, the last one counts.
+        streams: Plugin and label of each random stream that has been drawn from.
     """
 
     clock: Clock
@@ -73,6 +96,8 @@ class Context:
     steady: int = 12
     steady_steps: tuple[int, int] = (1, 12)
     later: list[Any] | None = None
+    redraws: list[Redraw] = field(default_factory=list)
+    streams: set[tuple[str, str]] = field(default_factory=set)
     _pool: ThreadPoolExecutor | None = None
 
     def __post_init__(self) -> None:
@@ -83,6 +108,35 @@ class Context:
     def row_seeds(self, world: np.ndarray, block: np.ndarray) -> np.ndarray:
         """Random key of each row, (n,), uint64: that of its world combined with the name of its block."""
         return np.asarray(self.keys[world] ^ self.block_keys[block])
+
+    def redrawn(
+        self,
+        seeds: np.ndarray,
+        draw: tuple[str, str],
+        world: np.ndarray,
+        block: np.ndarray,
+        index: np.ndarray,
+        of_world: bool = False,
+    ) -> np.ndarray:
+        """Keys of draws, (n,), uint64, with those that `redraws` gives to some of them.
+
+        Args:
+            seeds: Keys without them, (n,).
+            draw: Plugin and label.
+            world: World of each, (n,).
+            block: Block of its entity, (n,); -1 for none.
+            index: Index of the entity in its block, (n,).
+            of_world: The plugin is one of the world.
+        """
+        plugin, label = draw
+        out = seeds.copy()
+        for each in self.redraws:
+            if each.plugin in ("", plugin) and each.label in ("", label):
+                is_it = (world == each.world) & (of_world if each.block < 0 else block == each.block)
+                if each.index >= 0:
+                    is_it &= index == each.index
+                out[is_it] = each.key ^ self.block_keys[each.block] if each.block >= 0 else each.key
+        return out
 
     def split(self, n: int, run: Callable[[int, int], Any], least: int = 64) -> None:
         """Call run(first, last) on consecutive parts of [0, n): in parallel if `threads` > 1 and n >= 2 * least, else in one call."""

@@ -450,9 +450,18 @@ class GroupView:
         if self.context.later is not None:
             raise DeclarationError(f"{type(self._caller).__name__} promises only_calls_kernels, but {what}")
 
-    def _stream(self, label: str) -> int:
+    def _draw(self, label: str) -> tuple[str, str]:
+        """Plugin and label of a draw, noted as drawn."""
         self._differs(f"draws {label!r}")
-        return stream(self._caller.instance_name if self._caller is not None else "", label)
+        draw = self._caller.instance_name if self._caller is not None else "", label
+        self.context.streams.add(draw)
+        return draw
+
+    def _keyed_seeds(self, draw: tuple[str, str]) -> np.ndarray:
+        """Random key of each row for a draw, (n,)."""
+        if not self.context.redraws:
+            return self._seeds
+        return self.context.redrawn(self._seeds, draw, self.world, self.block, self.block_index)
 
     def uniform(self, label: str, k: int | None = None) -> np.ndarray:
         """Uniform draws in [0, 1), (n,) or (k, n); an entity's draws do not depend on other entities."""
@@ -466,7 +475,10 @@ class GroupView:
 
     def draw_lines(self, law: str, label: str, k: int) -> np.ndarray:
         """The draws of `uniform` and `normal`, (k, n); for easy mode."""
-        return LAWS[law](self._seeds, self._stream(label), self.block_index, self.step_count, self.substep, k)
+        draw = self._draw(label)
+        return LAWS[law](
+            self._keyed_seeds(draw), stream(*draw), self.block_index, self.step_count, self.substep, k
+        )
 
     def uniform_pairs(self, label: str, near: Any, k: int | None = None) -> np.ndarray:
         """Uniform draws in [0, 1), one per pair of `near`, (m,) or (k, m); a pair's draws do not depend on other entities.
@@ -480,12 +492,10 @@ class GroupView:
         return self._of_pairs(rng.normal, label, near, k)
 
     def _of_pairs(self, law: Callable[..., np.ndarray], label: str, near: Any, k: int | None) -> np.ndarray:
-        row, clock = near.row, self.context.clock
-        seeds = self._seeds[row] ^ (self.bodies.id[near.other].astype(np.uint64) * GOLDEN)
+        row, clock, draw = near.row, self.context.clock, self._draw(label)
+        seeds = self._keyed_seeds(draw)[row] ^ (self.bodies.id[near.other].astype(np.uint64) * GOLDEN)
         step = clock.step[self.world[row]]
-        out = law(
-            seeds, self._stream(label), self.block_index[row], step, self.substep, 1 if k is None else k
-        )
+        out = law(seeds, stream(*draw), self.block_index[row], step, self.substep, 1 if k is None else k)
         return out if k is not None else out[0]
 
     def call(self, service: str, *args: Any, **kwargs: Any) -> Any:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from tussle.api.bodies import IN_PLACE, Bodies, BodyView
-from tussle.api.context import Context
+from tussle.api.context import Context, stream
 from tussle.api.group import GOLDEN, LAWS, GroupView
 from tussle.api.mass import MassProperties
 from tussle.declare.comms import TopicBuffer
@@ -243,11 +243,17 @@ class WorldView(GroupView):
         return super().normal(label, k)
 
     def draw_lines(self, law: str, label: str, k: int) -> np.ndarray:
-        clock, index = self.context.clock, np.zeros(self.n_worlds, np.int64)
-        return LAWS[law](self.context.keys, self._stream(label), index, clock.step, 0, k)
+        draw, context, index = self._draw(label), self.context, np.zeros(self.n_worlds, np.int64)
+        keys = context.keys
+        if context.redraws:
+            keys = context.redrawn(keys, draw, np.arange(self.n_worlds), index - 1, index, of_world=True)
+        return LAWS[law](keys, stream(*draw), index, context.clock.step, 0, k)
 
     def uniform_by(self, label: str, world: np.ndarray, first: np.ndarray, second: np.ndarray) -> np.ndarray:
-        """Uniform draws in [0, 1), (m,), keyed by (world, first, second) and not by position in the arrays."""
+        """Uniform draws in [0, 1), (m,), keyed by (world, first, second) and not by position in the arrays.
+
+        `first` is the id of the entity whose luck the draw is, where there is one; a number above it may be in its upper 32 bits.
+        """
         return np.asarray(self._keyed(rng.uniform, label, world, first, second, 1)[0])
 
     def normal_by(
@@ -265,8 +271,21 @@ class WorldView(GroupView):
         second: np.ndarray,
         k: int,
     ) -> np.ndarray:
-        seeds = self.context.keys[world] ^ (first.astype(np.uint64) * GOLDEN)
-        return law(seeds, self._stream(label), second, self.context.clock.step[world], 0, k)
+        draw, keys = self._draw(label), self.context.keys[world]
+        if self.context.redraws:
+            keys = self._redrawn_by(keys, draw, world, first)
+        seeds = keys ^ (first.astype(np.uint64) * GOLDEN)
+        return law(seeds, stream(*draw), second, self.context.clock.step[world], 0, k)
+
+    def _redrawn_by(
+        self, keys: np.ndarray, draw: tuple[str, str], world: np.ndarray, first: np.ndarray
+    ) -> np.ndarray:
+        """Keys of draws, (m,), with those of re-keys of this plugin, of entities and of blocks."""
+        rows = self.rows_at(world, first & (2**32 - 1))
+        block, index = np.full((2, len(rows)), -1)
+        is_there = rows >= 0
+        block[is_there], index[is_there] = self.block[rows[is_there]], self.block_index[rows[is_there]]
+        return self.context.redrawn(keys, draw, world, block, index, of_world=True)
 
     def call(self, service: str, *args: Any, **kwargs: Any) -> Any:
         """Call a service of a world plugin."""

@@ -209,7 +209,7 @@ class StressOptions(ManyGamesOptions):
     ] = False
     why: Annotated[
         bool,
-        flag("--why", "Show from which moment on the worst failing game was lost, by branches of it."),
+        flag("--why", "Show why and when the worst failing game was lost: what undoes the failure, by branches of it."),
     ] = False
     shrink: Annotated[
         bool,

@@ -24,10 +24,14 @@ from tussle.record.run_file import put_whole
 from tussle.stress.chances import Chance
 from tussle.stress.confidence import Assurance, junit_xml
 from tussle.stress.games import Played
+from tussle.stress.results import FAILURES, MAX_FAILURES, saved_file
 from tussle.stress.search import FailureSearch, label
 from tussle.stress.shrink import SmallestGame
-from tussle.stress.study import FAILURES, MAX_FAILURES, Probability, Sample, Stress
+from tussle.stress.study import Probability, Sample, Stress
+from tussle.stress.why import Why
 
+KINDS = {"luck": "luck of", "entity": "without", "plugin": "without", "messages": "messages of"}
+"""Kinds of counterfactuals, as they are shown."""
 MAX_SHOWN = 5
 """Failing games that the end of a study shows."""
 
@@ -86,7 +90,7 @@ def stress(options: StressOptions) -> int:
             else:
                 sample = study.sample(options.games, directory=directory, **how)
                 failures = sample.failures
-            lost = study.chances(failures[0], directory=directory, **how) if options.why and failures else []
+            why = study.why(failures[0], directory=directory, **how) if options.why and failures else None
         except Interrupted:
             say(
                 "interrupted",
@@ -100,8 +104,8 @@ def stress(options: StressOptions) -> int:
         show_probability(found, study, directory, options)
     else:
         show_sample(sample, study, directory, options)
-    if lost:
-        show_chances(lost, study)
+    if why is not None:
+        show_why(why, study, directory, options)
     if options.shrink and failures:
         show_smallest(study.smallest(failures[0]), study, directory, options)
     if options.holds is None:
@@ -226,8 +230,7 @@ def show_failures(failures: list[Played], study: Stress, directory: Path, option
     put(*number_tables(["game", "robustness", "fails at [s]", "seed", "branches"], rows))
     if len(failures) > MAX_SHOWN:
         put(f" the worst {MAX_SHOWN} of {len(failures):,}; {min(len(failures), MAX_FAILURES)} are kept")
-    files = "".join(f" --plugin-path {shlex.quote(str(p))}" for p in options.plugin_files)
-    put("", f" tussle run {shlex.quote(str(directory / FAILURES / '0.xml'))}{files}")
+    put("", f" tussle run {shlex.quote(str(directory / FAILURES / '0.xml'))}{plugin_files(options)}")
 
 
 def show_chances(lost: list[Chance], study: Stress) -> None:
@@ -236,7 +239,7 @@ def show_chances(lost: list[Chance], study: Stress) -> None:
         (
             "",
             [
-                f"{study.mission.start + each.step * study.mission.dt:.6g}",
+                time_of(each.step, study),
                 share(each.value, each.low, each.high),
             ],
         )
@@ -246,6 +249,55 @@ def show_chances(lost: list[Chance], study: Stress) -> None:
     put(
         f" of {lost[0].n} branches of {FAILURES}/0.xml from each moment, with other luck; in parentheses: 95 % intervals"
     )
+
+
+def show_why(why: Why, study: Stress, directory: Path, options: StressOptions) -> None:
+    """Show when the worst game was lost, and what undoes its failure."""
+    show_chances(why.chances, study)
+    rows = [
+        (
+            "bold" if each.undoes else "",
+            [
+                f"{KINDS[each.kind]} {each.name}",
+                time_of(each.step, study),
+                share(each.value, each.low, each.high),
+                "yes" if each.undoes else "",
+            ],
+        )
+        for each in why.rows
+    ]
+    put("", *number_tables(["other than it was", "from t [s] on", "games that fail", "undoes it"], rows))
+    put("", fact_list(why_facts(why, study, directory, options)))
+
+
+def why_facts(why: Why, study: Stress, directory: Path, options: StressOptions) -> list[tuple[str, str]]:
+    """What to say below the table."""
+    opened = (
+        "from the beginning on it failed mostly or often"
+        if why.open_step is None
+        else time_of(why.open_step, study)
+    )
+    saved = "no branch passes"
+    if why.saved_step is not None:
+        file = shlex.quote(str(directory / saved_file(f"{FAILURES}/0.xml")))
+        saved = f"{time_of(why.saved_step, study)}; tussle run {file}{plugin_files(options)}"
+    return [
+        ("undone by", ", ".join(why.causes) or "nothing that was tried"),
+        ("needs", ", ".join(why.needed)),
+        ("open until t [s]", opened),
+        ("lost from t [s]", time_of(why.lost_step, study)),
+        ("saved at t [s]", saved),
+    ]
+
+
+def time_of(step: int, study: Stress) -> str:
+    """Time of the start of a step."""
+    return f"{study.mission.start + step * study.mission.dt:.6g}"
+
+
+def plugin_files(options: StressOptions) -> str:
+    """Options of a further command that names the same plugin files."""
+    return "".join(f" --plugin-path {shlex.quote(str(p))}" for p in options.plugin_files)
 
 
 def show_smallest(found: SmallestGame, study: Stress, directory: Path, options: StressOptions) -> None:
@@ -274,8 +326,7 @@ def show_smallest(found: SmallestGame, study: Stress, directory: Path, options: 
     put(*number_tables(["game", "entities", "blocks", "plugins", "length [s]"], rows))
     end = "no part of it can be left out" if found.is_smallest else "more could be left out"
     put(f" robustness {found.robustness:.6g}; {found.n_games} games were played, {end}")
-    files = "".join(f" --plugin-path {shlex.quote(str(p))}" for p in options.plugin_files)
-    put("", f" tussle run {shlex.quote(str(path))}{files}")
+    put("", f" tussle run {shlex.quote(str(path))}{plugin_files(options)}")
 
 
 def n_entities(mission: Mission) -> int:

@@ -6,8 +6,9 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
+from tussle.api.context import Redraw
 from tussle.engine.state import SimulationState
-from tussle.mission.rekeys import Rekeys, checked_rekeys
+from tussle.mission.rekeys import Rekeys, Target, check_targets, checked_rekeys
 from tussle.numeric.rng import stream_key
 
 DERIVED = np.uint64(stream_key("reseed"))
@@ -17,12 +18,14 @@ def set_rekeys(state: SimulationState, worlds: Iterable[int], rekeys: Sequence[R
     """Set the re-keys of worlds that are reset; by default those of the mission.
 
     Raises:
-        MissionError: They are not in order of their steps, or a number is not allowed.
+        MissionError: They are not in order of their steps, or a number or target is not allowed.
     """
-    own = state.mission.rekeys
+    own, redraws = state.mission.rekeys, state.context.redraws
     for i, world in enumerate(worlds):
         state.rekeys.pop(world, None)
+        redraws[:] = [redraw for redraw in redraws if redraw.world != world]
         if chosen := own if rekeys is None else checked_rekeys(rekeys[i]):
+            check_targets(chosen, *state.mission.draws)
             state.rekeys[world] = chosen
 
 
@@ -35,27 +38,39 @@ def renew_keys(state: SimulationState) -> None:
     if mission.reseed_time is not None:
         other = context.seeds ^ DERIVED if mission.reseed is None else np.uint64(mission.reseed)
         keys = np.where(context.clock.t >= mission.reseed_time - 1e-6 * mission.dt, other, keys)
-    for world, rekeys in state.rekeys.items():
-        for step, key in rekeys:
-            if step < context.clock.step[world]:
-                keys[world] = key
-    _use(state, keys)
+    _use(state, keys, 0)
 
 
 def branch_keys(state: SimulationState) -> None:
     """Set the keys of worlds that branch in this step: after its births and observers, so that what they have seen stays."""
-    keys, steps = state.context.keys.copy(), state.context.clock.step
+    _use(state, state.context.keys.copy(), 1)
+
+
+def _use(state: SimulationState, keys: np.ndarray, ahead: int) -> None:
+    """Let worlds draw with their keys, and with those of their re-keys of earlier steps than this one, or than the one `ahead`."""
+    context, redraws = state.context, []
     for world, rekeys in state.rekeys.items():
-        for step, key in rekeys:
-            if step == steps[world]:
+        own: list[Redraw] = []
+        for step, key, *target in rekeys:
+            if step >= context.clock.step[world] + ahead:
+                break
+            if target:
+                own.append(_redraw(state, world, key, Target.parse(target[0])))
+            else:
                 keys[world] = key
-    _use(state, keys)
-
-
-def _use(state: SimulationState, keys: np.ndarray) -> None:
-    context = state.context
+                own.clear()
+        redraws += own
+    context.redraws[:] = redraws
     if (keys != context.keys).any():
         context.keys[:] = keys
         for group in state.population.groups:
             for view in group.views:
                 view.renew()
+
+
+def _redraw(state: SimulationState, world: int, key: int, target: Target) -> Redraw:
+    names = state.context.block_names
+    if target.owner in names:
+        block = names.index(target.owner)
+        return Redraw(world, np.uint64(key), block, target.number - 1, target.plugin, target.label)
+    return Redraw(world, np.uint64(key), -1, -1, target.owner, target.label)

@@ -237,7 +237,8 @@ class Simulation:
             seeds: New seed of each; by default the previous one.
             params: As in the constructor; one value, or one per item of `worlds`.
             rekeys: For each, pairs of a step and the random key with which the world draws from there on: up to the start of that step
-                the game is the same, then it has other luck. By default those of the mission.
+                the game is the same, then it has other luck. With a target as of `Mission` for its draws alone. By default those of the
+                mission.
 
         Raises:
             ParameterError: A world does not exist or is given twice, or a seed or parameter is not allowed.

@@ -21,7 +21,7 @@ from tussle.mission.cadence import Cadence
 from tussle.mission.laws import check_compat, with_laws
 from tussle.mission.limits import Limits
 from tussle.mission.quantities import Quantities, QuantitiesOrNone, Quantity, QuantityOrNone, given
-from tussle.mission.rekeys import checked_rekeys
+from tussle.mission.rekeys import check_targets, checked_rekeys
 from tussle.plugins import stock
 from tussle.world.scene import Scene, find_region
 
@@ -301,7 +301,8 @@ class Mission:
         reseed_time: From the first step at or after this time on [s], random numbers are drawn with another seed; None for never.
         reseed: Seed from `reseed_time` on, the same for all worlds; None to derive it from the seed of each world.
         rekeys: (step, key) pairs: from the states at the start of that step on, all worlds draw random numbers with that key. So a game
-            is played again up to a step, and then with other luck.
+            is played again up to a step, and then with other luck. (step, key, target) is for the draws of a target alone: "left" for a
+            block, "left/2" for its second entity, "left//Hover/gust" for a plugin and a label of its draws, or a world plugin.
         limits: Limits on the entities that a world may hold, and on the positions drawn for them. The blocks' own entities are
             always accepted; `Limits.large()` is for plugins that spawn very many more.
     """
@@ -360,6 +361,7 @@ class Mission:
                 raise MissionError(
                     f"mission: {plugin.instance_name!r} is the name of a block and of a plugin; paths need unique names"
                 )
+        check_targets(self.rekeys, *self.draws)
         self._check_rates()
         self._check_needs()
         if not isinstance(self.scene, Scene):
@@ -409,6 +411,16 @@ class Mission:
                             raise MissionError(missing_service(service, services))
                 except TussleError as error:
                     raise MissionError(f"{where}: {plugin.instance_name}: {error}") from error
+
+    @property
+    def draws(self) -> tuple[dict[str, list[str]], list[str]]:
+        """Who draws random numbers: block -> names of its plugins, and the world plugins."""
+        names = [
+            [each.instance_name for plugin in outer.plugins for each in plugin.walk()]
+            for outer in self.blocks
+        ]
+        of_blocks = dict(zip([block.name for block in self.blocks], names, strict=True))
+        return of_blocks, [p.instance_name for p in self.world_plugins]
 
     @property
     def steps(self) -> int:

@@ -10,10 +10,12 @@ from tussle.stress.shrink import SmallestGame
 from tussle.stress.specification import Specification
 from tussle.stress.splitting import Repetition
 from tussle.stress.study import Probability, Sample, Stress
+from tussle.stress.why import Counterfactual, Why
 
 __all__ = [
     "Assurance",
     "Chance",
+    "Counterfactual",
     "FailureSearch",
     "GivenGame",
     "Monitor",
@@ -27,5 +29,6 @@ __all__ = [
     "StressGame",
     "Tried",
     "Verdict",
+    "Why",
     "given_games",
 ]

@@ -24,6 +24,7 @@ from tussle.errors import BatchError
 from tussle.mission import Mission
 from tussle.mission.rekeys import Rekeys, rekeys_text
 from tussle.record.run_file import plain, put_whole
+from tussle.stress.changes import Change
 from tussle.stress.monitor import Verdict, Watching
 
 STUDY_FILE, GAMES_FILE = "stress.json", "games.jsonl"
@@ -49,23 +50,32 @@ class StressGame:
         rekeys: Steps from which it has other luck.
         values: Values that are set beside those of all games, (name, value).
         mission: 0 for the mission of the study, 1 for the one that it is compared with.
+        change: What the mission lacks, see `tussle.stress.changes`.
     """
 
     seed: int
     rekeys: Rekeys = ()
     values: tuple[tuple[str, Any], ...] = ()
     mission: int = 0
+    change: Change = ()
 
     @property
     def name(self) -> str:
         """A text that no other game of the study has."""
         values = f"/{json.dumps(self.values)}" if self.values else ""
-        return f"{self.mission}/{self.seed}/{rekeys_text(self.rekeys)}{values}"
+        change = f"/without {json.dumps(self.change)}" if self.change else ""
+        return f"{self.mission}/{self.seed}/{rekeys_text(self.rekeys)}{values}{change}"
 
     def branch(self, step: int, key: int) -> StressGame:
         """The same game up to the state at the start of a step, and from there on with other luck."""
         kept = self.rekeys[: bisect_left(self.rekeys, (step,))]
-        return StressGame(self.seed, (*kept, (step, key)), self.values, self.mission)
+        return replace(self, rekeys=(*kept, (step, key)))
+
+    def redrawn(self, step: int, key: int, target: str) -> StressGame:
+        """The same game, in which the draws of a target alone have another key from a step on."""
+        later = [each[0] for each in self.rekeys if each[0] > step and len(each) == 2]
+        again = [(each, key, target) for each in (step, *later)]
+        return replace(self, rekeys=tuple(sorted((*self.rekeys, *again), key=lambda r: (r[0], *r[2:]))))
 
 
 @dataclass(frozen=True)
@@ -249,7 +259,7 @@ class GamePlayer:
 
     def _play(self, games: Sequence[StressGame], found: dict[StressGame, Played]) -> None:
         points, package = self.batch.design_points * len(games), self.package
-        if self.missions is not None and any(game.values or game.mission for game in games):
+        if self.missions is not None and any(game.values or game.mission or game.change for game in games):
             points, grouped = group_points(self.missions(games))
             package = replace(package, missions=grouped.missions)
         runs = [

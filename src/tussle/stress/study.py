@@ -20,27 +20,26 @@ from tussle.batch.batch import Batch
 from tussle.batch.design_points import check_variables, with_whole_numbers
 from tussle.batch.points import settings_of
 from tussle.batch.statistics import wilson
-from tussle.batch.store import reported
 from tussle.batch.variables import Variable
 from tussle.batch.varied import as_variables, variable_entry
-from tussle.documents import Whole, check_argument, json_text
+from tussle.documents import Whole, check_argument
 from tussle.engine.simulation import Simulation
 from tussle.errors import BatchError, ParameterError, TussleError
 from tussle.mission import Mission, to_xml
 from tussle.mission.effects import exactly
 from tussle.numeric import total
-from tussle.record.run_file import plain, put_whole, versions
+from tussle.record.run_file import versions
 from tussle.stress.chances import Chance, chances
+from tussle.stress.changes import changed
 from tussle.stress.games import GamePlayer, Ledger, Played, StressGame
 from tussle.stress.monitor import Watching
+from tussle.stress.results import write_result, write_why
 from tussle.stress.search import FailureSearch, search, searcher
 from tussle.stress.shrink import MAX_SHRINK_GAMES, SmallestGame, shrink
 from tussle.stress.specification import Function, Specification, columns_of
 from tussle.stress.splitting import Repetition, interval, split
+from tussle.stress.why import Explanation, Why
 
-RESULT_FILE, FAILURES = "result.json", "failures"
-MAX_FAILURES = 10
-"""Failing games that are written as missions."""
 MANY = 0.5
 """Part of the games that a round of splitting may replace before a note says so."""
 MIN_ANCESTORS = 5
@@ -179,6 +178,7 @@ class Stress:
             reading = {**options, "plugin_files": tuple(plugin_files)}
             self.variables = tuple(with_whole_numbers(mission, given, self.variables, **reading))
         self._made: dict[StressGame, Mission] = {}
+        self._written: tuple[Path, dict[str, Any]] | None = None  # the result that was written last
         self.watching = Watching(specification, dict(functions or {}))
         self.specification: Specification = self.watching.specification(self.mission)
 
@@ -419,6 +419,39 @@ class Stress:
             player = self._player(ledger, how)
             return chances(player.play, failed, moments, branches)
 
+    def why(
+        self,
+        failed: Played,
+        moments: int = 9,
+        branches: int = 50,
+        directory: str | Path | None = None,
+        **how: Any,
+    ) -> Why:
+        """Why a game failed: what undoes its failure, when it was decided, and the nearest game that passes.
+
+        Args:
+            failed: A game of this study that failed.
+            moments: Moments of the overview, as of `chances`.
+            branches: Games of each row, and from each moment.
+            directory: Where games are kept, and the result is added to that of `sample`, `probability` or `search`, with the nearest
+                passing game as `failures/N-saved.xml`; None keeps them in memory.
+            how: `executor`, `processes`, `stack` and `on_game`, as for `GamePlayer`.
+
+        Raises:
+            BatchError: A game has failed with an error, or the directory holds another study.
+            ParameterError: The game did not fail, or a number is not allowed.
+        """
+        check_argument("moments", moments, Whole(2, 10**4))
+        check_argument("branches", branches, Whole(2, 10**6))
+        with self._ledger(directory) as ledger:
+            player = self._player(ledger, how)
+            mission = self.mission_of(failed.game)
+            explanation = Explanation(player.play, failed, mission, self.watching, self.mission_of, branches)
+            found = explanation.find(moments)
+            if ledger is not None and self._written is not None and self._written[0] == ledger.path:
+                write_why(*self._written, found, self.failing_mission)
+        return found
+
     def smallest(self, failed: Played, max_games: int = MAX_SHRINK_GAMES) -> SmallestGame:
         """A small game that fails, from one of this study: fewer entities, blocks and plugins, shorter, with rounder numbers.
 
@@ -478,13 +511,14 @@ class Stress:
             TussleError: It cannot be played with them.
         """
         batch = (self.batch, *self.others)[game.mission]
-        if not game.values:
+        if not game.values and not game.change:
             return batch.mission
-        key = StressGame(0, (), game.values, game.mission)
+        key = StressGame(0, (), game.values, game.mission, game.change)
         if key not in self._made:
             if len(self._made) >= MAX_MADE:
                 self._made.clear()
-            (self._made[key],) = batch.missions_at([dict(game.values)])
+            mission = batch.missions_at([dict(game.values)])[0] if game.values else batch.mission
+            self._made[key] = changed(mission, game.change) if game.change else mission
         return self._made[key]
 
     def failing_mission(self, game: StressGame) -> str:
@@ -493,22 +527,9 @@ class Stress:
 
     def _write(self, ledger: Ledger | None, failures: Sequence[Played], result: Mapping[str, Any]) -> None:
         """Write the result, and the worst failures as missions."""
-        if ledger is None:
-            return
-        folder, listed = ledger.path / FAILURES, []
-        with reported(ledger.path):
-            for number, each in enumerate(failures[:MAX_FAILURES]):
-                folder.mkdir(exist_ok=True)
-                put_whole(folder / f"{number}.xml", self.failing_mission(each.game))
-                listed.append(
-                    {
-                        "file": f"{FAILURES}/{number}.xml",
-                        "robustness": each.verdict.robustness,
-                        "values": dict(each.game.values),
-                        "state_hash": each.state_hash,
-                    }
-                )
-            put_whole(ledger.path / RESULT_FILE, json_text(dict(plain({**result, "failures": listed}))))
+        if ledger is not None:
+            whole = write_result(ledger.path, failures, result, self.failing_mission)
+            self._written = ledger.path, whole
 
 
 class _Random:

@@ -31,6 +31,13 @@ def test_a_study_from_question_to_a_failing_game(tussle, folder):
     assert listed[0]["state_hash"] in played.stdout
     assert "branches that fail" in done.stdout
     assert re.search(r" 1 \(0\.\d+–1\)", done.stdout)
+    assert re.search(r"luck of left +0 +0\.?\d* \(\S+\) +yes", done.stdout)
+    assert re.search(r"undone by +luck left", done.stdout)
+    assert re.search(r"saved at t \[s\] +\d", done.stdout)
+    tussle("run", folder / "out/failures/0-saved.xml", "--plugin-path", EXAMPLE / "hover.py")
+    why = json.loads((folder / "out/result.json").read_text())["why"]
+    assert (why["file"], why["saved"]) == ("failures/0.xml", "failures/0-saved.xml")
+    assert {row["kind"] for row in why["rows"]} == {"luck", "entity"}
     plain = tussle(*STUDY, "-n", "30")
     assert re.search(r"failed +\d+ of 30 games", plain.stdout)
     assert re.search(r"robustness +\S+, \S+, \S+ \(least", plain.stdout)
@@ -39,16 +46,17 @@ def test_a_study_from_question_to_a_failing_game(tussle, folder):
 
 def test_a_study_that_is_killed_goes_on(process, tussle, folder):
     """And ends as one that was not."""
-    command = [*COMMAND, *map(str, SPLIT)]
-    for wait in (3.0, 5.0):
+    command = [*COMMAND, *map(str, SPLIT), "--why"]
+    for wait in (3.0, 5.0, 6.0):
         with subprocess.Popen(
             command, cwd=folder, env=environment(), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
         ) as one:
             time.sleep(wait)
             one.send_signal(signal.SIGKILL)
-    process(*SPLIT)
+    process(*SPLIT, "--why")
     result = (folder / "out/result.json").read_text()
-    tussle(*SPLIT[:-1], "4", "--out", "other")
+    assert '"why"' in result
+    tussle(*SPLIT, "--why", "--processes", "2", "--out", "other")
     assert (folder / "other/result.json").read_text() == result
 
 

@@ -197,3 +197,99 @@ def test_rekeys_in_python_that_are_none():
     sim = Simulation(game, [1, 2])
     with pytest.raises(ParameterError, match="rekeys of 1 for 2 worlds"):
         sim.reset([0, 1], rekeys=[()])
+
+
+class Losses(Interaction):
+    """Keeps a draw for each entity, keyed by its id, and one of the world."""
+
+    grade = "portable"
+    drawn = State(per="entity")
+    common = State(per="world")
+
+    def step(self, w):
+        self.drawn[:] = w.uniform_by("lot", w.world, w.id, np.zeros(w.n, np.int64))
+        self.common[:] = w.uniform("common")
+
+
+def of_targets(sim):
+    """The draws of each of six steps: of entities (6, 1 + 3) for both plugins, and of the world, (6,)."""
+    own, lots, common = [], [], []
+    for _ in range(6):
+        sim.step()
+        own.append([*sim.read("a.Draws.drawn")[0][-1], *sim.read("swarm.Draws.drawn")[0][-1]])
+        lots.append(sim.state.world_bindings[0].plugin.drawn[-4:].tolist())
+        common.append(sim.read("Losses.common")[0][-1])
+    return np.array(own), np.array(lots), np.array(common)
+
+
+A, SWARM = [0], [1, 2, 3]
+
+
+@pytest.mark.parametrize(
+    ("target", "entities", "lots", "common"),
+    [
+        ("a", A, A, False),
+        ("swarm", SWARM, SWARM, False),
+        ("swarm/2", [2], [2], False),
+        ("swarm/2/Draws", [2], [], False),
+        ("swarm//Draws/draw", SWARM, [], False),
+        ("swarm/3/Losses/lot", [], [3], False),
+        ("swarm//Draws/other", [], [], False),
+        ("Losses", [], A + SWARM, True),
+        ("Losses///common", [], [], True),
+    ],
+)
+def test_a_rekey_with_a_target_changes_its_draws_alone(target, entities, lots, common):
+    """From its step on, alone and in a stack, until the whole world is re-keyed."""
+    swarm = block("swarm", count=3, autonomy=Draws(), variance=(100.0, 100.0, 0.0))
+    game = mission(block(autonomy=Draws()), swarm, interactions=[Losses()])
+    whole = of_targets(Simulation(game, [1]))
+    stack = Simulation(game, [4, 5, 1])
+    stack.reset([0, 2], [4, 1], rekeys=[((0, 3, "a"),), ((2, 9, target), (4, 11))])
+    found = of_targets(stack)
+    for got, alone in zip(
+        found, of_targets(Simulation(game.replace(rekeys=((2, 9, target), (4, 11))), [1])), strict=True
+    ):
+        np.testing.assert_array_equal(got, alone)
+    for values, was, chosen in zip(found[:2], whole[:2], (entities, lots), strict=True):
+        is_new = np.zeros((2, 4), bool)
+        is_new[:, chosen] = True
+        assert (values[:2] == was[:2]).all()
+        assert ((values[2:4] != was[2:4]) == is_new).all()
+    assert (found[2][:2] == whole[2][:2]).all()
+    assert (found[2][2:4] != whole[2][2:4]).all() == common
+    of_11 = of_targets(Simulation(game.replace(rekeys=((4, 11),)), [1]))
+    assert all((got[4:] == alone[4:]).all() for got, alone in zip(found, of_11, strict=True))
+    stack.reset([0, 2])
+    assert stack.state.context.redraws == []
+
+
+def test_targets_of_a_mission_file(tmp_path):
+    game = read(tmp_path, ' rekeys="4:7 4:8:team_1/1 4:8:team_1/2 9:1"').mission
+    assert game.rekeys == ((4, 7), (4, 8, "team_1/1"), (4, 8, "team_1/2"), (9, 1))
+    path = tmp_path / "again.xml"
+    path.write_text(to_xml(game, 3))
+    assert read_mission(path).mission.rekeys == game.rekeys
+
+
+@pytest.mark.parametrize(
+    ("rekeys", "message"),
+    [
+        ([(4, 7, "b")], "there is no block or plugin 'b'; "),
+        ([(4, 7, "a//Drawz")], "there is no block or plugin 'Drawz' .did you mean 'Draws'"),
+        ([(4, 7, "WorldDraws/2")], "WorldDraws is a world plugin, of which there are no entities"),
+        ([(4, 7, "a/x")], "target 'a/x' of a re-key is not allowed"),
+        ([(4, 7, "")], "target '' of a re-key is not allowed"),
+        ([(4, 7, "a/1/Draws/draw/more")], "is not allowed; a target is a world plugin"),
+        ([(4, 7, "a"), (4, 7)], "rekeys = "),
+        ([(4, 7, "a"), (4, 8, "a")], "rekeys = "),
+        ([(4, 7, 3)], "rekeys = "),
+        ([(4, 7, "a", "b")], "rekeys = "),
+    ],
+)
+def test_targets_that_are_none(rekeys, message):
+    game = mission(block(autonomy=Draws()), interactions=[WorldDraws()])
+    with pytest.raises(MissionError, match=message):
+        game.replace(rekeys=rekeys)
+    with pytest.raises(MissionError, match=message):
+        Simulation(game, [1]).reset([0], rekeys=[rekeys])
