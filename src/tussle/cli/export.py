@@ -124,7 +124,10 @@ class _Exporter:
     def recording(self) -> Recording:
         """The run in memory. Tables are written without it."""
         world = self._options.world
-        recording = Recording(self._options.run, world or 0, tuple(self._options.plugin_files))
+        options = self._options
+        recording = Recording(
+            options.run, world or 0, tuple(options.plugin_files), ground_map=options.ground_map
+        )
         n_worlds = len(recording.run.info.get("worlds", ()))
         if world is None and n_worlds > 1:
             say_note(f"the run has {n_worlds} worlds; world 0 is shown, --world selects another")

@@ -9,7 +9,15 @@ from typing import Annotated, Any
 
 import typer
 
-from tussle.cli.options import PluginOptions, TussleCommand, argument, check_positive, flag, option
+from tussle.cli.options import (
+    MapOptions,
+    PluginOptions,
+    TussleCommand,
+    argument,
+    check_positive,
+    flag,
+    option,
+)
 
 DEFAULT_NAMES = {
     "html": "replay.html",
@@ -31,11 +39,12 @@ USED_BY = {
     **dict.fromkeys(("speed", "fps"), FILMS),
     "at": ("png",),
     "scale": (*IMAGES, "mcap"),
+    **dict.fromkeys(("map_file", "map_bounds"), (*IMAGES, "html", "mcap")),
     "period": ("html", "mcap", "rosbag2"),
     "storage": ("rosbag2",),
 }  # fmt: skip
 """Outputs that use an option."""
-SPECIAL_NAMES = {"start": "--from", "stop": "--to"}
+SPECIAL_NAMES = {"start": "--from", "stop": "--to", "map_file": "--map"}
 
 
 class ExportCommand(TussleCommand):
@@ -57,7 +66,7 @@ def _output(name: str, what: str) -> Any:
 
 
 @dataclass(frozen=True, kw_only=True)
-class ExportOptions(PluginOptions):
+class ExportOptions(MapOptions, PluginOptions):
     """Convert a recorded run to a web page, film, image or tables; several outputs at once are possible."""
 
     run: Annotated[Path, argument("RUN", "A run directory, complete or not.")]

@@ -11,6 +11,7 @@ import typer
 
 from tussle.cli import completion
 from tussle.cli.options import (
+    MapOptions,
     MissionOptions,
     PluginOptions,
     argument,
@@ -172,7 +173,7 @@ class NewOptions:
 
 
 @dataclass(frozen=True, kw_only=True)
-class PageOptions(PluginOptions):
+class PageOptions(MapOptions, PluginOptions):
     """Options of the viewer page."""
 
     pace: Annotated[

@@ -43,7 +43,7 @@ def view(options: ViewOptions) -> int:
         options.read() if planned is None else (planned.loaded, planned.mission, planned.seed)
     )
     viewer = loaded.viewer
-    watchings = watchings_of(options.spec, mission)
+    watchings, ground_map = watchings_of(options.spec, mission), options.ground_map
     with ExitStack() as stack:
         with compiling():
             simulation = stack.enter_context(simulate(loaded, mission, seed))
@@ -74,6 +74,7 @@ def view(options: ViewOptions) -> int:
             link=link,
             specifications=monitors,
             margin=1.0 if options.margin is None else options.margin,
+            ground_map=ground_map,
         )
         stack.callback(live.stop)
         page = stack.enter_context(Page(live, host=options.host, port=options.port, has_roles=options.roles))
@@ -124,7 +125,13 @@ def replay(options: ReplayOptions) -> int:
         The exit code.
     """
     runs = [
-        Recording(path, options.world, tuple(options.plugin_files), is_mapped=True)
+        Recording(
+            path,
+            options.world,
+            tuple(options.plugin_files),
+            is_mapped=True,
+            ground_map=options.ground_map,
+        )
         for path in (options.run, options.other)
         if path is not None
     ]
