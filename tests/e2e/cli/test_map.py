@@ -1,6 +1,9 @@
-"""tussle view, replay and export on a map."""
+"""tussle view, replay and export on a map, and exports for other maps."""
 
 from __future__ import annotations
+
+import json
+from xml.etree import ElementTree as ET
 
 import pytest
 from PIL import Image
@@ -58,3 +61,38 @@ def test_a_mission_without_an_origin_and_bounds_without_a_map(tussle, field):
     assert "--map only" in tussle("view", "field.xml", *BOUNDS, code=2).stderr
     tussle("run", "game.xml", "--out", "played", "--end", "0.2")
     assert "--map is allowed with" in tussle("export", "played", "--csv", "--map", "photo.png", code=2).stderr
+
+
+def test_a_run_is_written_for_other_maps(tussle, field):
+    tussle("run", "field.xml", "--out", "played", "--end", "1")
+    asked = (
+        "--geojson",
+        "--kml",
+        "--czml",
+        "cesium.czml",
+        "--epoch",
+        "2026-05-04T11:30:00+02:00",
+        "--period",
+        "0.5",
+    )
+    lines = tussle("export", "played", *asked).stdout.splitlines()
+    assert [line.split(", 0 areas")[0] for line in lines] == [
+        f"{name}: 12 tracks" for name in ("played/tracks.geojson", "played/tracks.kml", "cesium.czml")
+    ]
+    assert len(json.loads((field / "played/tracks.geojson").read_text())["features"]) == 12
+    when = ET.parse(field / "played/tracks.kml").find(".//{http://www.opengis.net/kml/2.2}when")
+    assert when.text == "2026-05-04T09:30:00.000000Z"
+    packets = json.loads((field / "cesium.czml").read_text())
+    assert packets[0]["clock"]["interval"] == "2026-05-04T09:30:00.000000Z/2026-05-04T09:30:01.000000Z"
+
+
+def test_a_run_without_an_origin_has_no_place_on_other_maps(tussle, folder):
+    tussle("run", "game.xml", "--out", "played", "--end", "0.2")
+    for kind in ("geojson", "kml", "czml"):
+        done = tussle("export", "played", f"--{kind}", code=4)
+        assert "set <latitude_origin> and <longitude_origin>" in done.stderr
+        assert not (folder / f"played/tracks.{kind}").exists()
+    assert (
+        "--epoch is allowed with" in tussle("export", "played", "--geojson", "--epoch", "2026", code=2).stderr
+    )
+    assert "is no date" in tussle("export", "played", "--kml", "--epoch", "noon", code=1).stderr
