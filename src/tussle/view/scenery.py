@@ -209,13 +209,34 @@ def _shapes(mission: Mission, notes: list[str]) -> list[tuple[str, int | None, V
         if len(mesh.faces) > MAX_FACES:
             notes.append(f"mesh {i} has {len(mesh.faces):,} triangles; {MAX_FACES:,} of them are shown")
     found += [(f"wall {i + 1}", None, shape, True) for i, shape in enumerate(scene.walls)]
-    found += [(p.instance_name, r.team, r.shape, False) for p in mission.interactions for r in p.regions()]
+    roles = _roles(mission)
+    for p in mission.interactions:
+        found += [(_region_name(p, r.boundary, roles), r.team, r.shape, False) for r in p.regions()]
     for plugin in mission.interactions:
         try:
             found += [("", None, wall, True) for wall in plugin.walls()]
         except TussleError as error:  # the file of a recorded run's map may be elsewhere
             notes.append(f"{error}; its walls are not shown")
     return found
+
+
+def _roles(mission: Mission) -> dict[int, set[str]]:
+    """Uses of boundaries by their ids: "flag" of one that a plugin's `flag_boundary_id` names."""
+    roles: dict[int, set[str]] = {}
+    for plugin in mission.interactions:
+        for name, value in plugin.values.items():
+            if name.endswith("_boundary_id"):
+                roles.setdefault(int(value), set()).add(name.removesuffix("_boundary_id"))
+    return roles
+
+
+def _region_name(plugin: Any, boundary: int, roles: Mapping[int, set[str]]) -> str:
+    """Name of a region: that of its plugin, with its id where the mission gives none, and its uses: "Boundary 2 (capture)"."""
+    name = str(plugin.instance_name)
+    if name == type(plugin).__name__:
+        name = f"{name} {boundary}"
+    uses = sorted(roles.get(boundary, set()) - {name})
+    return f"{name} ({', '.join(uses)})" if uses else name
 
 
 def _corners(shape: Volume | TriangleMesh) -> list[np.ndarray]:
