@@ -181,7 +181,7 @@ class MapOptions:
         Path | None,
         option(
             "FILE",
-            "Show this map on the ground: GeoTIFF, or PNG or JPEG with --map-bounds. The mission needs an origin.",
+            "Show this map on the ground: GeoTIFF, MBTiles, PMTiles, or PNG or JPEG with --map-bounds. The mission needs an origin.",
             "--map",
         ),
     ] = None

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import gzip
 import io
+import sqlite3
+import struct
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
@@ -48,4 +52,78 @@ def write_geotiff(
             tags.tagtype[tag] = kind
             tags[tag] = values
     Image.fromarray(image).save(path, "TIFF", tiffinfo=tags, compression=compression)
+    return path
+
+
+Tile = tuple[int, int, int]
+"""Zoom, column, row from the north."""
+
+
+def write_mbtiles(path: Path, tiles: dict[Tile, object], kind: str = "png") -> Path:
+    """Write an MBTiles file, whose rows count from the south."""
+    base = sqlite3.connect(path)
+    base.execute("CREATE TABLE metadata (name text, value text)")
+    base.execute("INSERT INTO metadata VALUES ('format', ?)", (kind,))
+    base.execute(
+        "CREATE TABLE tiles (zoom_level integer, tile_column integer, tile_row integer, tile_data blob)"
+    )
+    rows = [(zoom, column, 2**zoom - 1 - row, data) for (zoom, column, row), data in tiles.items()]
+    base.executemany("INSERT INTO tiles VALUES (?, ?, ?, ?)", rows)
+    base.commit()
+    base.close()
+    return path
+
+
+def varint(value: int) -> bytes:
+    """A number of variable length, seven bits a byte."""
+    found = bytearray()
+    while value > 127:
+        found.append(value & 127 | 128)
+        value >>= 7
+    return bytes([*found, value])
+
+
+def directory(entries: Iterable[tuple[int, int, int, int]]) -> bytes:
+    """A directory of PMTiles: number, offset, length and run of each entry."""
+    entries = list(entries)
+    numbers, offsets, lengths, runs = (list(column) for column in zip(*entries, strict=True))
+    steps = [b - a for a, b in zip([0, *numbers], numbers, strict=False)]
+    follows = [i > 0 and offsets[i] == offsets[i - 1] + lengths[i - 1] for i in range(len(entries))]
+    kept = [0 if follows[i] else offset + 1 for i, offset in enumerate(offsets)]
+    return b"".join(map(varint, [len(entries), *steps, *runs, *lengths, *kept]))
+
+
+def write_pmtiles(
+    path: Path,
+    tiles: dict[int, bytes],
+    zooms: tuple[int, int],
+    *,
+    kind: int = 2,
+    packed: int = 2,
+    leaf: int = 0,
+) -> Path:
+    """Write a PMTiles file of tiles by their numbers; with `leaf`, so many entries are in a directory below the root."""
+    data, entries = b"", []
+    for number in sorted(tiles):
+        entries.append((number, len(data), len(tiles[number]), 1))
+        data += tiles[number]
+
+    def pack(content: bytes) -> bytes:
+        return gzip.compress(content, mtime=0) if packed == 2 else content
+
+    leaves = b""
+    if leaf:
+        root = []
+        for i in range(0, len(entries), leaf):
+            part = pack(directory(entries[i : i + leaf]))
+            root.append((entries[i][0], len(leaves), len(part), 0))
+            leaves += part
+        entries = root
+    top = pack(directory(entries))
+    at = 127
+    head = struct.pack(
+        "<7sB11Q6B", b"PMTiles", 3, at, len(top), at + len(top), 0, at + len(top), len(leaves),
+        at + len(top) + len(leaves), len(data), len(tiles), len(tiles), len(tiles), 1, packed, 1, kind, *zooms,
+    )  # fmt: skip
+    path.write_bytes(head.ljust(127, b"\0") + top + leaves + data)
     return path

@@ -3,19 +3,25 @@
 from __future__ import annotations
 
 import math
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
 from tussle.documents import read_bytes
 from tussle.errors import ParameterError, clipped, listed, nearest_name
 from tussle.view.ground_map.geotiff import placed_geotiff
+from tussle.view.ground_map.mbtiles import MbTiles
 from tussle.view.ground_map.placed import Area, GroundPicture, PlacedPicture, opened
+from tussle.view.ground_map.pmtiles import PmTiles
 from tussle.view.ground_map.projections import GEOGRAPHIC
+from tussle.view.ground_map.tiles import stitched
 
 MAX_BYTES = 1 << 28
 """Size of a picture's file."""
 FORMATS = {".png": "PNG", ".jpg": "JPEG", ".jpeg": "JPEG", ".tif": "TIFF", ".tiff": "TIFF"}
 """Pictures, by the ends of their names."""
+TILES = (".mbtiles", ".pmtiles")
+"""Files of tiles, by the ends of their names."""
 NO_ORIGIN = (
     "the mission has no origin, so a map has no place in it; set <latitude_origin> and <longitude_origin>, "
     "in Python Scene(origin=Origin.from_degrees(latitude, longitude))"
@@ -24,7 +30,7 @@ NO_ORIGIN = (
 
 @dataclass(frozen=True)
 class GroundMap:
-    """A map that pictures show on the ground: a PNG or JPEG with bounds, or a GeoTIFF.
+    """A map that pictures show on the ground: a PNG or JPEG with bounds, a GeoTIFF, MBTiles or PMTiles.
 
     Args:
         path: Its file.
@@ -39,13 +45,16 @@ class GroundMap:
 
     def __post_init__(self) -> None:
         suffix = self.path.suffix.lower()
-        if suffix not in FORMATS:
+        known = (*FORMATS, *TILES)
+        if suffix not in known:
             raise ParameterError(
-                f"{self.path}: {suffix!r} is no format of maps{nearest_name(suffix, FORMATS)}; {listed(FORMATS)}"
+                f"{self.path}: {suffix!r} is no format of maps{nearest_name(suffix, known)}; {listed(known)}"
             )
+        if self.bounds is not None and suffix in TILES:
+            raise ParameterError(f"{self.path}: tiles have their own bounds; --map-bounds is for pictures")
         if self.bounds is not None:
             _check_bounds(self.path, self.bounds)
-        elif FORMATS[suffix] != "TIFF":
+        elif FORMATS.get(suffix) in ("PNG", "JPEG"):
             raise ParameterError(
                 f"{self.path}: a picture without bounds has no place; give west, south, east and north in degrees: "
                 f"--map-bounds W,S,E,N"
@@ -64,12 +73,17 @@ class GroundMap:
         """
         if area.origin.is_default:
             raise ParameterError(f"{self.path}: {NO_ORIGIN}")
-        return self._placed().laid(area, is_trimmed)
+        return self._placed(area).laid(area, is_trimmed)
 
-    def _placed(self) -> PlacedPicture:
-        where = str(self.path)
+    def _placed(self, area: Area) -> PlacedPicture:
+        where, suffix = str(self.path), self.path.suffix.lower()
+        if suffix == ".pmtiles":
+            return stitched(where, PmTiles(self.path), area)
+        if suffix == ".mbtiles":
+            with closing(MbTiles(self.path)) as tiles:
+                return stitched(where, tiles, area)
         data = read_bytes(self.path, ParameterError, MAX_BYTES)
-        image = opened(where, data, (FORMATS[self.path.suffix.lower()],))
+        image = opened(where, data, (FORMATS[suffix],))
         if self.bounds is None:
             return placed_geotiff(where, image)
         west, south, east, north = self.bounds
