@@ -74,7 +74,7 @@ class Live:
         link: Over which messages, orders, sticks and settings come to the game; by default they come before the next step.
         specifications: Monitors of the simulation, made before its first step, see `tussle.stress.Monitor`.
         margin: Distance from failure below which there is an alarm, in the SI unit of what a specification compares.
-        ground_map: A map that pictures show on the ground.
+        ground_map: A map that pictures show on the ground; by default that of the mission file.
 
     Raises:
         ParameterError: A value is not allowed.

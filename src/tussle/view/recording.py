@@ -53,7 +53,7 @@ class Recording:
         plugin_files: Python files with plugins of the run's mission; by default those that the directory holds, if the user's own.
         is_mapped: States stay in their file and are checked when a frame is made of them, so a run of any size opens at once. Extent
             and teams are then those of at most `MAX_SAMPLED` frames, evenly spaced.
-        ground_map: A map that pictures show on the ground.
+        ground_map: A map that pictures show on the ground; by default that of the mission file.
 
     Attributes:
         run: The run directory as it was loaded.
@@ -470,7 +470,7 @@ class Recording:
                 plugin_files=self._plugin_files or self._own_plugins(),
                 plays=False,
             )
-            self.notes.extend(note for note in loaded.notes if "<terrain>" in note)
+            self.notes.extend(note for note in loaded.notes if "<terrain>" in note or "<map>" in note)
             return loaded
         except TussleError as error:
             first = str(error).splitlines()[0]

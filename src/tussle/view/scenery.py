@@ -111,7 +111,7 @@ def scenery_of(
         mission: The mission, the name of one that ships, or a mission file; None if it is unknown, which leaves ground and grid.
         viewer: Viewer tags of the mission file, see `tussle.mission.Loaded`.
         extent: Lower and upper corner of all positions of a game [m], each (3,); by default of the initial positions.
-        ground_map: A map on the ground, in place of the terrain's texture.
+        ground_map: A map on the ground, in place of the terrain's texture; by default that of the mission file.
 
     Raises:
         MissionError: There is no such mission.
@@ -135,6 +135,12 @@ def scenery_of(
     origin = Origin() if scene is None else scene.origin
     ground = scene.ground.height if scene is not None and scene.ground is not None else 0.0
     terrain = None if hills is None else Terrain.of(hills)
+    try:
+        if ground_map is None and "map" in viewer:
+            own = GroundMap.of_mission(viewer["map"])
+            terrain = _mapped(own, origin, terrain, ground, low, high)
+    except TussleError as error:
+        notes.append(f"{error}; the mission's map is not shown")
     if ground_map is not None:
         terrain = _mapped(ground_map, origin, terrain, ground, low, high)
     spacing = viewer.get("grid_spacing", 0.0)

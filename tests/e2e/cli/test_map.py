@@ -63,6 +63,42 @@ def test_a_mission_without_an_origin_and_bounds_without_a_map(tussle, field):
     assert "--map is allowed with" in tussle("export", "played", "--csv", "--map", "photo.png", code=2).stderr
 
 
+def test_a_map_of_the_mission_is_shown_and_goes_with_the_run(tussle, field):
+    mission = (field / "field.xml").read_text()
+    tag = '<map bounds="13.2, 52.1, 13.4, 52.3">photo.png</map>'
+    (field / "field.xml").write_text(mission.replace("<seed>", f"{tag}<seed>"))
+    tussle("check", "field.xml")
+    tussle("run", "field.xml", "--out", "played", "--end", "1")
+    (field / "photo.png").unlink()
+    tussle("export", "played", "--html")
+    assert '"hasTexture":true' in (field / "played/replay.html").read_text()
+    (field / "played/photo.png").unlink()
+    said = tussle("export", "played", "--html").stderr
+    assert "there is no photo.png, so there is no map" in " ".join(said.split()).replace("'", "")
+    assert '"hasTexture":false' not in (field / "played/replay.html").read_text()  # no terrain at all
+
+
+@pytest.mark.parametrize(
+    ("tag", "code", "text"),
+    [
+        ("<map>photo.mbtiles</map>", 1, "is no picture"),
+        ("<map>../photo.png</map>", 1, "only files in the mission's folder"),
+        ('<map bound="1">photo.png</map>', 1, "did you mean 'bounds'"),
+        ("<map>photo.png</map>", 0, "--map-bounds W,S,E,N; the mission's map is not shown"),
+        ('<map bounds="1, 2, 3">photo.png</map>', 0, "not four numbers"),
+        ('<map bounds="3.2, 52.1, 3.4, 52.3">photo.png</map>', 0, "outside the mission's area"),
+    ],
+)
+def test_a_map_of_the_mission_that_cannot_be_shown(tussle, field, tag, code, text):
+    mission = (field / "field.xml").read_text()
+    (field / "field.xml").write_text(mission.replace("<seed>", f"{tag}<seed>"))
+    Image.new("RGB", (3, 2)).save(field.parent / "photo.png")
+    done = tussle("run", "field.xml", "--strict", "--out", "played", "--end", "0.2", code=code)
+    if not code:
+        done = tussle("export", "played", "--html")
+    assert text in " ".join(done.stderr.split())
+
+
 def test_a_run_is_written_for_other_maps(tussle, field):
     tussle("run", "field.xml", "--out", "played", "--end", "1")
     asked = (
@@ -96,3 +132,12 @@ def test_a_run_without_an_origin_has_no_place_on_other_maps(tussle, folder):
         "--epoch is allowed with" in tussle("export", "played", "--geojson", "--epoch", "2026", code=2).stderr
     )
     assert "is no date" in tussle("export", "played", "--kml", "--epoch", "noon", code=1).stderr
+
+
+def test_a_run_is_read_in_the_folder_of_the_mission_with_its_own_terrain(tussle, field):
+    mission = (field / "field.xml").read_text()
+    (field / "hills.asc").write_text("ncols 3\nnrows 3\ncellsize 10\n" + "1 2 3\n" * 3)
+    (field / "field.xml").write_text(mission.replace("<seed>", "<terrain>hills.asc</terrain><seed>"))
+    tussle("run", "field.xml", "--out", "played", "--end", "0.2")
+    assert "cannot be read" not in tussle("export", "played", "--html").stderr
+    assert '"hasTexture":false' in (field / "played/replay.html").read_text()

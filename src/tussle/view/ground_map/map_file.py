@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
@@ -42,6 +43,15 @@ class GroundMap:
 
     path: Path
     bounds: tuple[float, float, float, float] | None = None
+
+    @classmethod
+    def of_mission(cls, said: Mapping[str, str]) -> GroundMap:
+        """The map of a mission file, see `tussle.mission.Loaded.viewer`.
+
+        Raises:
+            ParameterError: As for a map of one's own.
+        """
+        return cls(Path(said["file"]), read_bounds(said["bounds"]) if said["bounds"] else None)
 
     def __post_init__(self) -> None:
         suffix = self.path.suffix.lower()
