@@ -8,8 +8,9 @@ import zlib
 
 import numpy as np
 import pytest
-from map_files import coded, encoded, write_geotiff
+from map_files import coded, encoded, geo_keys, write_geotiff
 from PIL import Image
+from PIL.TiffImagePlugin import ImageFileDirectory_v2
 
 from tussle import Block, Mission, Scene
 from tussle.errors import ParameterError
@@ -292,6 +293,21 @@ def test_a_geotiff_of_heights_or_cut_off(refused, tmp_path):
     for n in (9, 2000, len(whole) - 30_000):
         (tmp_path / "cut.tif").write_bytes(whole[:n])
         refused("the map cannot be read", tmp_path / "cut.tif", None)
+
+
+def test_a_geotiff_whose_tags_are_of_other_types(refused, tmp_path):
+    for tag, kind, value in ((34735, 3, (7,)), (33550, 2, "scale"), (33550, 12, (1e-300, 1e-300, 0.0))):
+        tags = ImageFileDirectory_v2()
+        for name, its_kind, its_value in ((34735, 3, geo_keys(4326)), (33550, 12, SCALE), (33922, 12, TIE)):
+            tags.tagtype[name], tags[name] = (kind, value) if name == tag else (its_kind, its_value)
+        Image.fromarray(coded()).save(tmp_path / "odd.tif", tiffinfo=tags)
+        refused("odd.tif", tmp_path / "odd.tif", None)
+
+
+def test_pictures_of_all_kinds_of_pixels(tmp_path):
+    for mode in ("1", "L", "LA", "P", "RGB", "RGBA"):
+        Image.fromarray(coded()).convert(mode).save(tmp_path / "m.png")
+        assert GroundMap(tmp_path / "m.png", BOUNDS).over(area(52.0, 13.3)).image.std() > 10, mode
 
 
 def test_a_tiff_without_a_place_takes_bounds(tmp_path):

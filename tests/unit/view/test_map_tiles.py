@@ -108,7 +108,7 @@ def test_only_the_tiles_of_the_area_are_read(tmp_path, monkeypatch):
         assert 1 <= len(asked) <= 4
 
 
-def test_missing_tiles_are_grey_and_a_smaller_zoom_takes_the_place_of_none(tmp_path):
+def test_missing_tiles_are_grey_and_zooms_without_tiles_are_left_out(tmp_path):
     latitude, longitude = PLACES[1]
     tiles = tiles_around(latitude, longitude)
     column, row = (int(x) for x in place_of(latitude, longitude, ZOOM))
@@ -120,6 +120,30 @@ def test_missing_tiles_are_grey_and_a_smaller_zoom_takes_the_place_of_none(tmp_p
     for file in files(tmp_path / "far", {**tiles, **tiles_around(latitude + 1.0, longitude, 14)}):
         image = GroundMap(file).over(area(latitude, longitude)).image
         assert (image[..., 2] == ZOOM).mean() > 0.3
+
+
+def test_a_part_of_a_smaller_zoom_is_shown_in_place_of_a_missing_tile(tmp_path):
+    latitude, longitude = PLACES[0]
+    column, row = (int(x) for x in place_of(latitude, longitude, ZOOM))
+    tiles = tiles_around(latitude, longitude)
+    del tiles[ZOOM, column, row]
+    # Two zooms below; its part where the missing tile belongs is white.
+    image = np.zeros((256, 256, 3), np.uint8)
+    left, top = 64 * (column % 4), 64 * (row % 4)
+    image[top : top + 64, left : left + 64] = 255
+    tiles[ZOOM - 2, column // 4, row // 4] = encoded(image)
+    where = area(latitude, longitude)
+    for file in files(tmp_path, tiles):
+        picture = GroundMap(file).over(where)
+        h, w = picture.image.shape[:2]
+        is_white = (picture.image > 200).all(axis=2)
+        for y, x in [(h // 2, w // 2), *np.argwhere(is_white)[::997]]:
+            east, north = (x + 0.5) / w * 6000.0 - 3000.0, 3000.0 - (y + 0.5) / h * 6000.0
+            lat, lon, _ = where.origin.to_geodetic([east, north, 0.0])
+            i, j = place_of(math.degrees(lat), math.degrees(lon), ZOOM)
+            assert (int(i), int(j)) == (column, row)
+            assert is_white[y, x]
+        assert not (picture.image == GREY).all(axis=2).any()
 
 
 def test_numbers_of_tiles_are_those_of_the_specification():

@@ -12,7 +12,7 @@ from tussle.documents import read_bytes
 from tussle.errors import ParameterError, clipped, listed, nearest_name
 from tussle.view.ground_map.geotiff import placed_geotiff
 from tussle.view.ground_map.mbtiles import MbTiles
-from tussle.view.ground_map.placed import Area, GroundPicture, PlacedPicture, opened
+from tussle.view.ground_map.placed import Area, GroundPicture, PlacedPicture, opened, reading
 from tussle.view.ground_map.pmtiles import PmTiles
 from tussle.view.ground_map.projections import GEOGRAPHIC
 from tussle.view.ground_map.tiles import stitched
@@ -95,7 +95,8 @@ class GroundMap:
         data = read_bytes(self.path, ParameterError, MAX_BYTES)
         image = opened(where, data, (FORMATS[suffix],))
         if self.bounds is None:
-            return placed_geotiff(where, image)
+            with reading(where):  # its tags can be of any type
+                return placed_geotiff(where, image)
         west, south, east, north = self.bounds
         width, height = image.size
         cell = ((east - west) / width, (north - south) / height)

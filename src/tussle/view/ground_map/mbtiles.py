@@ -42,11 +42,15 @@ class MbTiles:
             self._base = sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro&immutable=1", uri=True)
             self._base.execute("PRAGMA trusted_schema = OFF")
             self._base.set_progress_handler(lambda: 1, MAX_INSTRUCTIONS)
-        kind = self._one("SELECT value FROM metadata WHERE name = 'format'")
-        if kind not in RASTER:
-            raise ParameterError(
-                f"{path}: its tiles are {kind!r}; a map on the ground takes pictures: {', '.join(RASTER)}"
-            )
+        try:
+            kind = self._one("SELECT value FROM metadata WHERE name = 'format'")
+            if kind not in RASTER:
+                raise ParameterError(
+                    f"{path}: its tiles are {kind!r}; a map on the ground takes pictures: {', '.join(RASTER)}"
+                )
+        except ParameterError:
+            self.close()
+            raise
 
     @contextmanager
     def _asking(self) -> Iterator[None]:

@@ -133,8 +133,8 @@ class PlacedPicture:
             raise ParameterError(
                 f"{self.where}: the mission's area is too large for a map in {self.projection.name}"
             )
-        first = np.maximum(np.floor(places.min(axis=(1, 2))), 0).astype(int)
-        last = np.minimum(np.ceil(places.max(axis=(1, 2))), self.image.size).astype(int)
+        first = np.clip(np.floor(places.min(axis=(1, 2))), 0, self.image.size).astype(int)
+        last = np.clip(np.ceil(places.max(axis=(1, 2))), 0, self.image.size).astype(int)
         if (first >= last).any():
             raise ParameterError(self._outside(area))
         known = np.stack([x.ravel(), y.ravel(), np.ones(x.size)], axis=1)
@@ -233,7 +233,7 @@ def flat(image: Any) -> Any:
     """An image as red, green, blue, with grey where it is transparent."""
     from PIL import Image
 
-    if not image.has_transparency_data:
+    if image.mode not in ("RGBA", "LA", "PA") and "transparency" not in image.info:
         return image.convert("RGB")
     under = Image.new("RGBA", image.size, (*GREY, 255))
     return Image.alpha_composite(under, image.convert("RGBA")).convert("RGB")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -39,6 +39,8 @@ class TileSource(Protocol):
 def stitched(where: str, source: TileSource, area: Area) -> PlacedPicture:
     """The tiles of an area as one picture: those of the largest zoom at which they are at most `MAX_TILES`, and there is one.
 
+    In place of one that is missing, a part of one of a smaller zoom is shown.
+
     Args:
         where: The file, for messages.
         source: Its tiles.
@@ -61,14 +63,18 @@ def stitched(where: str, source: TileSource, area: Area) -> PlacedPicture:
         n_tiles = len(rows) * len(columns)
         if n_tiles > MAX_TILES:
             continue
-        found = {
-            (i, j): data
-            for j, row in enumerate(rows)
-            for i, column in enumerate(columns)
-            if (data := source.tile(zoom, column % n, row)) is not None
-        }
-        if found:
-            return _joined(where, found, zoom, columns, rows)
+        places = [(i, j) for j in range(len(rows)) for i in range(len(columns))]
+        tiles = {(i, j): source.tile(zoom, columns[i] % n, rows[j]) for i, j in places}
+        if not any(tiles.values()):
+            continue
+        images: dict[tuple[int, int], Any] = {}
+        for (i, j), data in tiles.items():
+            images[i, j] = (
+                _part(where, source, least, zoom, columns[i] % n, rows[j])
+                if data is None
+                else _image(where, data)
+            )
+        return _joined(where, images, zoom, columns, rows)
     if n_tiles > MAX_TILES:
         raise ParameterError(
             f"{where}: at its least zoom, {least}, the mission's area takes {n_tiles:,} tiles; allowed are {MAX_TILES}"
@@ -76,21 +82,39 @@ def stitched(where: str, source: TileSource, area: Area) -> PlacedPicture:
     raise ParameterError(f"{where}: the map lies outside the mission's area: it has no tile there")
 
 
+def _image(where: str, data: bytes) -> Any:
+    with reading(where):
+        return flat(opened(where, data, FORMATS, MAX_TILE_SIDE**2))
+
+
+def _part(where: str, source: TileSource, least: int, zoom: int, column: int, row: int) -> Any | None:
+    """A missing tile, cut from the nearest one of a smaller zoom that is there and enlarged; None without one."""
+    for up in range(1, zoom - least + 1):
+        data = source.tile(zoom - up, column >> up, row >> up)
+        if data is None:
+            continue
+        image = _image(where, data)
+        share, part = image.size[0] / 2**up, 2**up - 1
+        left, top = (column & part) * share, (row & part) * share
+        with reading(where):
+            return image.resize(image.size, box=(left, top, left + share, top + share))
+    return None
+
+
 def _joined(
-    where: str, found: dict[tuple[int, int], bytes], zoom: int, columns: range, rows: range
+    where: str, images: dict[tuple[int, int], Any], zoom: int, columns: range, rows: range
 ) -> PlacedPicture:
-    """One picture of tiles by column and row, counted from the first ones."""
+    """One picture of tiles by column and row, counted from the first ones; None is grey."""
     from PIL import Image
 
-    images = {place: opened(where, data, FORMATS, MAX_TILE_SIDE**2) for place, data in found.items()}
-    sides = {image.size for image in images.values()}
+    sides = {image.size for image in images.values() if image is not None}
     (width, height), *others = sides
     if others or width != height:
         raise ParameterError(f"{where}: its tiles at zoom {zoom} are not squares of one size")
     whole = Image.new("RGB", (len(columns) * width, len(rows) * width), GREY)
-    with reading(where):
-        for (i, j), image in images.items():
-            whole.paste(flat(image), (i * width, j * width))
+    for (i, j), image in images.items():
+        if image is not None:
+            whole.paste(image, (i * width, j * width))
     tile = EARTH_WIDTH / 2**zoom
     west, north = columns[0] * tile - 0.5 * EARTH_WIDTH, 0.5 * EARTH_WIDTH - rows[0] * tile
     return PlacedPicture(where, whole, MERCATOR, west, north, (tile / width, tile / width))
