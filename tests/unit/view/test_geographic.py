@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import math
+import sys
+from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from xml.etree import ElementTree as ET
 
@@ -12,7 +14,7 @@ import pytest
 from recorded_games import hunt, record
 
 from tussle import Block, Mission, Scene
-from tussle.errors import ParameterError, ViewError
+from tussle.errors import MissingExtraError, ParameterError, ViewError
 from tussle.scene import Base, Cuboid, Origin, Prism
 from tussle.stock import Boundary, Still
 from tussle.view import Recording
@@ -264,3 +266,22 @@ def test_kml_is_valid_whatever_a_run_directory_calls_its_blocks():
     assert root.find(f".//{KML}Data[@name='block']/{KML}value").text == "\ufffd\ufffd]]>&"
     assert root.find(f".//{GX}coord").text == "18.4 -33.9 0.0000001"
     assert root.find(f".//{KML}Placemark/{KML}styleUrl").text == "#no-team"
+
+
+def test_a_run_without_states_or_with_places_that_are_none(hunted, tmp_path, monkeypatch):
+    read = hunted.frame
+    lost = read(3)
+    monkeypatch.setattr(
+        hunted, "frame", lambda i: replace(read(i), pos=lost.pos * np.nan) if i == 3 else read(i)
+    )
+    with pytest.raises(ViewError, match="a position is not finite"):
+        write_geographic(hunted, tmp_path / "out", "kml")
+    monkeypatch.setattr(
+        "tussle.view.export.geographic.places.kept_frames", lambda t, period: np.zeros(0, int)
+    )
+    with pytest.raises(ViewError, match="holds no states"):
+        write_geographic(hunted, tmp_path / "out", "kml")
+    monkeypatch.setitem(sys.modules, "scipy.spatial", None)
+    with pytest.raises(MissingExtraError, match="need scipy"):
+        write_geographic(hunted, tmp_path / "out", "kml")
+    assert list(tmp_path.iterdir()) == []

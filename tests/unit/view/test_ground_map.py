@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import struct
+import sys
 import zlib
 
 import numpy as np
@@ -13,7 +14,7 @@ from PIL import Image
 from PIL.TiffImagePlugin import ImageFileDirectory_v2
 
 from tussle import Block, Mission, Scene
-from tussle.errors import ParameterError
+from tussle.errors import MissingExtraError, ParameterError
 from tussle.scene import HeightField
 from tussle.stock import Still
 from tussle.view import GroundMap, scenery_of
@@ -293,6 +294,23 @@ def test_a_geotiff_of_heights_or_cut_off(refused, tmp_path):
     for n in (9, 2000, len(whole) - 30_000):
         (tmp_path / "cut.tif").write_bytes(whole[:n])
         refused("the map cannot be read", tmp_path / "cut.tif", None)
+
+
+def test_without_pillow_it_is_said_what_to_install(tmp_path, monkeypatch):
+    (tmp_path / "m.png").write_bytes(encoded(coded()))
+    monkeypatch.setitem(sys.modules, "PIL", None)
+    with pytest.raises(MissingExtraError, match=r"m\.png: maps need Pillow: pip install 'tussle\[maps\]'"):
+        GroundMap(tmp_path / "m.png", BOUNDS).over(area(52.0, 13.3))
+
+
+def test_a_zone_in_which_the_mission_has_no_coordinates(refused, tmp_path):
+    given = {"scale": (10.0, 10.0, 0.0), "tie": (0.0, 0.0, 0.0, 5e5, 1e6, 0.0)}
+    refused(
+        "no coordinates in EPSG:32633",
+        write_geotiff(tmp_path / "m.tif", coded(), 32633, **given),
+        None,
+        area(0.0, 105.0),
+    )
 
 
 def test_a_geotiff_whose_tags_are_of_other_types(refused, tmp_path):

@@ -220,6 +220,14 @@ def test_an_mbtiles_file_without_tables_and_one_that_never_ends(tmp_path):
     )
     base.close()
     refused(tmp_path / "f.mbtiles", "interrupted")
+    base = sqlite3.connect(write_mbtiles(tmp_path / "b.mbtiles", {}))
+    base.execute("DROP TABLE tiles")
+    base.execute(
+        "CREATE VIEW tiles AS SELECT 0 AS zoom_level, 0 AS tile_column, 0 AS tile_row, "
+        "CAST(zeroblob(900000000) AS TEXT) || 'x' AS tile_data"
+    )
+    base.close()
+    refused(tmp_path / "b.mbtiles", "too big")
 
 
 def test_a_pmtiles_file_that_is_damaged(tmp_path, monkeypatch):

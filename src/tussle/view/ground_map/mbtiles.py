@@ -15,6 +15,8 @@ from tussle.view.ground_map.tiles import MAX_TILE_BYTES, checked_zooms
 
 MAX_INSTRUCTIONS = 100_000_000
 """Instructions of SQLite for one question: views of a hostile file may never end."""
+MAX_VALUE = 1 << 26
+"""Bytes of a value in SQLite: such a view may also make large ones."""
 TILE = "SELECT tile_data FROM tiles WHERE zoom_level = ? AND tile_column = ? AND tile_row = ?"
 TILE_LENGTH = TILE.replace("tile_data", "length(tile_data)")
 RASTER = ("png", "jpg", "jpeg", "webp")
@@ -41,6 +43,7 @@ class MbTiles:
         with self._asking():
             self._base = sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro&immutable=1", uri=True)
             self._base.execute("PRAGMA trusted_schema = OFF")
+            self._base.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, MAX_VALUE)
             self._base.set_progress_handler(lambda: 1, MAX_INSTRUCTIONS)
         try:
             kind = self._one("SELECT value FROM metadata WHERE name = 'format'")

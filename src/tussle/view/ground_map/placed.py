@@ -54,7 +54,8 @@ class Area:
         """Coordinates of points on the ground, given by east and north [m], in a projection."""
         points = np.stack([x, y, np.full_like(x, self.height)]).reshape(3, -1)
         latitude, longitude, _ = self.origin.to_geodetic(points)
-        east, north = projection.project(latitude, longitude)
+        with np.errstate(all="ignore"):  # a place may have no coordinates in a zone that is far away
+            east, north = projection.project(latitude, longitude)
         return east.reshape(x.shape), north.reshape(x.shape)
 
 
@@ -131,7 +132,7 @@ class PlacedPicture:
         places = np.stack(self.places(area, x, y))
         if not np.isfinite(places).all():
             raise ParameterError(
-                f"{self.where}: the mission's area is too large for a map in {self.projection.name}"
+                f"{self.where}: the mission's area has no coordinates in {self.projection.name}, so far is it from there"
             )
         first = np.clip(np.floor(places.min(axis=(1, 2))), 0, self.image.size).astype(int)
         last = np.clip(np.ceil(places.max(axis=(1, 2))), 0, self.image.size).astype(int)

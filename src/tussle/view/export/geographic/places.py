@@ -137,8 +137,8 @@ def areas_of(recording: Recording, notes: list[str]) -> Iterator[GeographicArea]
     origin, scenery = origin_of(recording), recording.scenery
     for number, base in enumerate(scenery.bases, 1):
         x, y, z = base.position
-        low, high = (_ring(origin, _circle(x, y, base.radius), height) for height in (z, z))
-        yield GeographicArea("base", f"base {number}", base.team, low, high)
+        ring = _ring(origin, _circle(x, y, base.radius), z)
+        yield GeographicArea("base", f"base {number}", base.team, ring, ring)
     for region in scenery.boundaries:
         if isinstance(region.shape, (Plane, TriangleMesh)):
             what = "a plane has no edge" if isinstance(region.shape, Plane) else "it is a mesh"
