@@ -141,3 +141,11 @@ def test_a_run_is_read_in_the_folder_of_the_mission_with_its_own_terrain(tussle,
     tussle("run", "field.xml", "--out", "played", "--end", "0.2")
     assert "cannot be read" not in tussle("export", "played", "--html").stderr
     assert '"hasTexture":false' in (field / "played/replay.html").read_text()
+
+
+def test_bounds_in_the_west_begin_with_a_minus(tussle, field):
+    mission = (field / "field.xml").read_text().replace("<longitude_origin>13.3", "<longitude_origin>-13.3")
+    (field / "west.xml").write_text(mission)
+    tussle("run", "west.xml", "--out", "played", "--end", "0.2")
+    tussle("export", "played", "--html", "--map", "photo.png", "--map-bounds", "-13.4,52.1,-13.2,52.3")
+    assert '"hasTexture":true' in (field / "played/replay.html").read_text()
