@@ -50,6 +50,21 @@ def read_bytes(path: Path, error: type[TussleError], most: int = MAX_BYTES) -> b
         raise error(f"{path}: cannot be read: {getattr(reason, 'strerror', None) or reason}") from None
 
 
+def read_part(path: Path, error: type[TussleError], start: int, n: int) -> bytes:
+    """Read a part of a file of any size: n bytes from `start`, fewer where it ends before.
+
+    Raises:
+        TussleError: As `error`: the file is not a regular file, or cannot be read.
+    """
+    try:
+        size_of(path)
+        with path.open("rb") as file:
+            file.seek(start)
+            return file.read(n)
+    except (OSError, ValueError, OverflowError) as reason:
+        raise error(f"{path}: cannot be read: {getattr(reason, 'strerror', None) or reason}") from None
+
+
 def read_text(path: Path, error: type[TussleError], most: int = MAX_BYTES) -> str:
     """Read a UTF-8 text file.
 

@@ -22,7 +22,7 @@ from tussle.api import Autonomy, Output
 from tussle.mission import read_mission
 from tussle.stock import SingleIntegrator
 from tussle.stress import Monitor, Specification
-from tussle.view import Live, Recording
+from tussle.view import GroundMap, Live, Recording
 from tussle.view.export.html import write_html
 from tussle.view.page.access import PageRole
 from tussle.view.page.compare import Comparison
@@ -273,6 +273,45 @@ def texture(browser: Browser) -> None:
             shoot(watched, "view-texture")
 
 
+def on_map(browser: Browser) -> None:
+    """Robots above fields, a road and a river, with a flag and the place to which it is brought."""
+    with tempfile.TemporaryDirectory() as folder:
+        y, x = np.mgrid[1.0:0.0:800j, 0.0:1.0:1000j]
+        shade = np.random.default_rng(4).random((9, 12))[(y * 8.999).astype(int), (x * 11.999).astype(int)]
+        image = np.stack([0.33 + 0.25 * shade, 0.46 + 0.12 * shade, 0.24 + 0.1 * shade], axis=-1)
+        image[np.minimum((12.0 * x) % 1.0, (9.0 * y) % 1.0) < 0.05] *= 0.8
+        image[np.abs(y - 0.62 - 0.08 * np.sin(7.0 * x)) < 0.018] = (0.30, 0.45, 0.60)
+        image[np.abs(x - 0.48 - 0.2 * (y - 0.5)) < 0.006] = (0.80, 0.79, 0.75)
+        matplotlib.image.imsave(f"{folder}/photo.png", np.clip(image, 0.0, 1.0))
+        Path(folder, "field.xml").write_text(FIELD)
+        loaded = read_mission(Path(folder, "field.xml"))
+        ground_map = GroundMap(Path(folder, "photo.png"), (13.2925, 52.1960, 13.3075, 52.2040))
+        live = Live(
+            Simulation(loaded.mission, 3), viewer=loaded.viewer, is_paused=True, ground_map=ground_map
+        )
+        with live, shown(browser, Page(live, viewer=loaded.viewer)) as watched:
+            live.step(60)
+            watched.wait("player.frame === 60")
+            watched.choose(5)
+            watched.tab.mouse.move(560, 330)
+            shoot(watched, "view-map")
+
+
+FIELD = """<runscript name="A flag on a field"><run dt="0.1" end="60"/>
+<latitude_origin>52.2</latitude_origin><longitude_origin>13.3</longitude_origin><altitude_origin>40</altitude_origin>
+<ground>0</ground><show_origin>false</show_origin>
+<entity_interaction name="flag" id="1" team_id="1" type="sphere" center="130 60 0" radius="20">Boundary</entity_interaction>
+<entity_interaction id="2" team_id="2" type="sphere" center="-160 -40 0" radius="25">Boundary</entity_interaction>
+<entity_interaction flag_boundary_id="1" capture_boundary_id="2">FlagCaptureInteraction</entity_interaction>
+<entity><name>guard</name><team_id>1</team_id><count>4</count><x>110</x><y>40</y><z>10</z><visual_model>iris</visual_model><visual_scale>6</visual_scale>
+  <placement>uniform</placement><half_width_x>40</half_width_x><half_width_y>40</half_width_y><motion_model>Still</motion_model></entity>
+<entity><name>runner</name><team_id>2</team_id><count>6</count><x>-150</x><y>-30</y><z>10</z><visual_model>iris</visual_model><visual_scale>6</visual_scale>
+  <placement>uniform</placement><half_width_x>60</half_width_x><half_width_y>60</half_width_y>
+  <autonomy>TakeFlag</autonomy><motion_model max_speed="15">SingleIntegrator</motion_model></entity>
+</runscript>
+"""
+
+
 HILLS = """<runscript name="Crates on hills"><run dt="0.1" end="60"/>
 <terrain cell="1.5" height="30" texture="photo.png">hills.png</terrain><show_origin>false</show_origin>
 <camera pos="90, -70, 95" focal_point="90, 85, 10"/>
@@ -296,6 +335,7 @@ PICTURES: dict[str, Callable[[Browser], None]] = {
     "offline": offline,
     "shapes": shapes,
     "texture": texture,
+    "map": on_map,
 }
 
 

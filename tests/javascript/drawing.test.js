@@ -5,6 +5,7 @@ import { test } from 'node:test';
 import { Camera, pixelOf, placeBehind, STEEPEST } from '../../src/tussle/view/page/web/camera.js';
 import { decimalsOf, eventText, length, number, times } from '../../src/tussle/view/page/web/formatting.js';
 import { forward, halfTurn, minus, norm, rotated, turned, unit } from '../../src/tussle/view/page/web/geometry.js';
+import { geodeticOf, sidesOf } from '../../src/tussle/view/page/web/geodesy.js';
 import { coarse, prepared } from '../../src/tussle/view/page/web/models.js';
 import { Reader } from '../../src/tussle/view/page/web/packing.js';
 import { linkOpacity, pairsWithin, sectorMesh } from '../../src/tussle/view/page/web/reach.js';
@@ -178,4 +179,24 @@ test('events as sentences', () => {
   assert.equal(say('death', 1, 3, 'fuel'), 'drone 1 died: fuel (drone 3)');
   assert.equal(say('end', 0, 0, 'one_team'), 'the game ended: one team is left');
   assert.equal(say('landing', 1, 0, 'soft'), 'landing drone 1 soft');
+});
+
+/** Origins, places, and what geodesy.py makes of them. */
+const PLACES = [
+  [[52.2, 13.3, 40.0], [1000.0, 2000.0, 50.0], [52.217972922193184, 13.314631666182315, 90.39193027466536]],
+  [[-33.9, 18.4, 120.0], [-20000.0, 15000.0, 3000.0], [-33.764644611874175, 18.184214319197242, 3169.0024496670812]],
+  [[89.9, 10.0, 0.0], [500.0, 12000.0, 0.0], [89.99132028538078, 158.9528142736838, 11.270237105898559]],
+  [[0.0, -60.0, 10.0], [0.0, 0.0, -30.0], [0.0, -59.99999999999999, -20.000000000931323]],
+];
+
+test('latitude and longitude of a place are those of geodesy.py, to a millimetre', () => {
+  for (const [origin, place, expected] of PLACES) {
+    const found = geodeticOf(origin, place);
+    isNear(found.slice(0, 2), expected.slice(0, 2), 1e-8);
+    isNear(found.slice(2), expected.slice(2), 1e-3);
+  }
+  isNear(geodeticOf([0, 179.999, 0], [1000, 0, 0]).slice(0, 2), [0, -179.9920168], 1e-6);
+  assert.equal(geodeticOf([0, 0, 0], [2e6, 0, 0]), null);
+  assert.deepEqual(sidesOf([-33.9, 18.4]), ['33.900000° S', '18.400000° E']);
+  assert.deepEqual(sidesOf([0, -0.0000012]), ['0.000000° N', '0.000001° W']);
 });

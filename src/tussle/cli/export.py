@@ -6,12 +6,13 @@ import math
 import re
 import time
 from collections.abc import Mapping
+from datetime import datetime
 from functools import cached_property
 from pathlib import Path
 
 import typer
 
-from tussle.cli.export_options import ExportOptions, PlotOptions
+from tussle.cli.export_options import GEOGRAPHIC, ExportOptions, PlotOptions
 from tussle.cli.options import read_time
 from tussle.cli.progress import ProgressMeter, home_short
 from tussle.cli.terminal import INTERRUPTED, NOT_WRITTEN, OK, out, say, say_error, say_note
@@ -51,6 +52,7 @@ def export(options: ExportOptions) -> int:
     writers = {
         ("csv", "parquet"): exporter.write_tables,
         ("html",): exporter.write_html,
+        GEOGRAPHIC: exporter.write_geographic,
         ("mcap",): exporter.write_mcap,
         ("rosbag2",): exporter.write_rosbag2,
         ("png", "mp4", "gif"): exporter.write_films,
@@ -100,6 +102,20 @@ def read_size(text: str) -> tuple[int, int]:
     return int(found[1]), int(found[2])
 
 
+def read_date(text: str) -> datetime:
+    """Parse a date and time.
+
+    Raises:
+        ParameterError: It has another form.
+    """
+    try:
+        return datetime.fromisoformat(text)
+    except ValueError:
+        raise ParameterError(
+            f"--epoch {text!r} is no date as ISO 8601 writes it, such as 2026-05-04T09:30:00Z"
+        ) from None
+
+
 def size_of(path: Path) -> str:
     """Format the size of a file: "812 B", "4.5 kB", "12 MB"."""
     n = float(path.stat().st_size)
@@ -124,7 +140,10 @@ class _Exporter:
     def recording(self) -> Recording:
         """The run in memory. Tables are written without it."""
         world = self._options.world
-        recording = Recording(self._options.run, world or 0, tuple(self._options.plugin_files))
+        options = self._options
+        recording = Recording(
+            options.run, world or 0, tuple(options.plugin_files), ground_map=options.ground_map
+        )
         n_worlds = len(recording.run.info.get("worlds", ()))
         if world is None and n_worlds > 1:
             say_note(f"the run has {n_worlds} worlds; world 0 is shown, --world selects another")
@@ -151,6 +170,22 @@ class _Exporter:
 
         report = write_html(self.recording, files["html"], period=self._options.period)
         _report(report.path, f"{report.n_frames:,} states of {report.n_entities:,} entities")
+
+    def write_geographic(self, files: Mapping[str, Path]) -> None:
+        from tussle.view.export.geographic import DEFAULT_EPOCH, write_geographic
+
+        recording, options = self.recording, self._options
+        epoch = DEFAULT_EPOCH if options.epoch is None else read_date(options.epoch)
+        notes: list[str] = []
+        for kind, path in files.items():
+            with ProgressMeter(kind, "tracks") as meter:
+                report = write_geographic(
+                    recording, path, kind, period=options.period, epoch=epoch, show=meter.show
+                )
+            notes += report.notes
+            _report(path, f"{report.n_tracks:,} tracks, {report.n_areas:,} areas")
+        for note in dict.fromkeys(notes):
+            say_note(note)
 
     def write_mcap(self, files: Mapping[str, Path]) -> None:
         from tussle.view.export.mcap_file import write_mcap

@@ -9,7 +9,15 @@ from typing import Annotated, Any
 
 import typer
 
-from tussle.cli.options import PluginOptions, TussleCommand, argument, check_positive, flag, option
+from tussle.cli.options import (
+    MapOptions,
+    PluginOptions,
+    TussleCommand,
+    argument,
+    check_positive,
+    flag,
+    option,
+)
 
 DEFAULT_NAMES = {
     "html": "replay.html",
@@ -18,6 +26,9 @@ DEFAULT_NAMES = {
     "png": "picture.png",
     "mcap": "run.mcap",
     "rosbag2": "rosbag2",
+    "geojson": "tracks.geojson",
+    "kml": "tracks.kml",
+    "czml": "tracks.czml",
     "csv": "states.csv",
     "parquet": "states.parquet",
 }
@@ -26,16 +37,19 @@ DEFAULT_FILE = "@"
 """Placeholder for the default file, inserted by `ExportCommand`."""
 FILMS = ("mp4", "gif")
 IMAGES = (*FILMS, "png")
+GEOGRAPHIC = ("geojson", "kml", "czml")
 USED_BY = {
     **dict.fromkeys(("camera", "follow", "start", "stop", "size", "trails", "labels", "no_caption", "zoom"), IMAGES),
     **dict.fromkeys(("speed", "fps"), FILMS),
     "at": ("png",),
     "scale": (*IMAGES, "mcap"),
-    "period": ("html", "mcap", "rosbag2"),
+    **dict.fromkeys(("map_file", "map_bounds"), (*IMAGES, "html", "mcap")),
+    "period": ("html", "mcap", "rosbag2", *GEOGRAPHIC),
+    "epoch": ("kml", "czml"),
     "storage": ("rosbag2",),
 }  # fmt: skip
 """Outputs that use an option."""
-SPECIAL_NAMES = {"start": "--from", "stop": "--to"}
+SPECIAL_NAMES = {"start": "--from", "stop": "--to", "map_file": "--map"}
 
 
 class ExportCommand(TussleCommand):
@@ -57,7 +71,7 @@ def _output(name: str, what: str) -> Any:
 
 
 @dataclass(frozen=True, kw_only=True)
-class ExportOptions(PluginOptions):
+class ExportOptions(MapOptions, PluginOptions):
     """Convert a recorded run to a web page, film, image or tables; several outputs at once are possible."""
 
     run: Annotated[Path, argument("RUN", "A run directory, complete or not.")]
@@ -67,6 +81,9 @@ class ExportOptions(PluginOptions):
     png: Annotated[Path | None, _output("png", "One image.")] = None
     mcap: Annotated[Path | None, _output("mcap", "A log for Foxglove.")] = None
     rosbag2: Annotated[Path | None, _output("rosbag2", "A folder for ros2 bag.")] = None
+    geojson: Annotated[Path | None, _output("geojson", "Tracks and areas by latitude and longitude.")] = None
+    kml: Annotated[Path | None, _output("kml", "The same with times, for Google Earth.")] = None
+    czml: Annotated[Path | None, _output("czml", "The same with times, for Cesium.")] = None
     csv: Annotated[Path | None, _output("csv", "Tables of states and events.")] = None
     parquet: Annotated[Path | None, _output("parquet", "The same tables, compressed.")] = None
     world: Annotated[int | None, option("N", "World of a stack; by default 0, for tables all.", min=0)] = None
@@ -96,7 +113,11 @@ class ExportOptions(PluginOptions):
     scale: Annotated[float | None, option("X", "Factor on the size of the models.")] = None
     period: Annotated[
         float | None,
-        option("S", "Time between the states in --html, --mcap and --rosbag2 [s]; by default all states."),
+        option("S", "Time between the states, except in tables and films [s]; by default all states."),
+    ] = None
+    epoch: Annotated[
+        str | None,
+        option("DATE", "Date and time of t = 0 in --kml and --czml; by default 2000-01-01T00:00:00Z."),
     ] = None
 
     storage: Annotated[str | None, option("mcap|sqlite3", "File format of --rosbag2; by default mcap.")] = (

@@ -19,6 +19,7 @@ from tussle.errors import ParameterError
 
 if TYPE_CHECKING:
     from tussle.mission import Loaded, Mission
+    from tussle.view.ground_map import GroundMap
 
 # \b keeps click from rewrapping the lines that follow.
 EPILOG = "\b\nExit codes:\n" + "\n".join(f"  {code:>3}  {meaning}" for code, meaning in EXIT_CODES.items())
@@ -170,6 +171,40 @@ class PluginOptions:
     plugin_files: Annotated[
         list[Path], option("FILE", "A Python file with plugins. Can be repeated.", "--plugin-path")
     ] = field(default_factory=list)
+
+
+@dataclass(frozen=True, kw_only=True)
+class MapOptions:
+    """A map on the ground of pictures."""
+
+    map_file: Annotated[
+        Path | None,
+        option(
+            "FILE",
+            "Show this map on the ground: GeoTIFF, MBTiles, PMTiles, or PNG or JPEG with --map-bounds. The mission needs an origin.",
+            "--map",
+        ),
+    ] = None
+    map_bounds: Annotated[
+        str | None,
+        option("W,S,E,N", "Edges of the map in degrees: west, south, east, north.", "--map-bounds"),
+    ] = None
+
+    @property
+    def ground_map(self) -> GroundMap | None:
+        """The map; None without one.
+
+        Raises:
+            typer.BadParameter: There are bounds without a map.
+            ParameterError: The file is no map, or its bounds are not allowed.
+        """
+        if self.map_file is None:
+            if self.map_bounds is not None:
+                raise typer.BadParameter("--map-bounds is allowed with --map only")
+            return None
+        from tussle.view.ground_map import GroundMap, read_bounds
+
+        return GroundMap(self.map_file, None if self.map_bounds is None else read_bounds(self.map_bounds))
 
 
 @dataclass(frozen=True, kw_only=True)

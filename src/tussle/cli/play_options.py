@@ -12,6 +12,7 @@ import typer
 
 from tussle.cli import completion
 from tussle.cli.options import (
+    MapOptions,
     MissionOptions,
     PluginOptions,
     argument,
@@ -174,7 +175,7 @@ class NewOptions:
 
 
 @dataclass(frozen=True, kw_only=True)
-class PageOptions(PluginOptions):
+class PageOptions(MapOptions, PluginOptions):
     """Options of the viewer page."""
 
     pace: Annotated[

@@ -45,7 +45,7 @@ def view(options: ViewOptions) -> int:
     )
     viewer = loaded.viewer
     operator_roles(options.operators, {block.team for block in mission.blocks})
-    watchings = watchings_of(options.spec, mission)
+    watchings, ground_map = watchings_of(options.spec, mission), options.ground_map
     with ExitStack() as stack:
         with compiling():
             simulation = stack.enter_context(simulate(loaded, mission, seed))
@@ -76,6 +76,7 @@ def view(options: ViewOptions) -> int:
             link=link,
             specifications=monitors,
             margin=1.0 if options.margin is None else options.margin,
+            ground_map=ground_map,
         )
         stack.callback(live.stop)
         page = stack.enter_context(
@@ -134,7 +135,13 @@ def replay(options: ReplayOptions) -> int:
         The exit code.
     """
     runs = [
-        Recording(path, options.world, tuple(options.plugin_files), is_mapped=True)
+        Recording(
+            path,
+            options.world,
+            tuple(options.plugin_files),
+            is_mapped=True,
+            ground_map=options.ground_map,
+        )
         for path in (options.run, options.other)
         if path is not None
     ]

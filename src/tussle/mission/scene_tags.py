@@ -14,12 +14,14 @@ from tussle.mission.data_files import DataFiles
 from tussle.mission.node import Node
 from tussle.mission.problems import Problems
 from tussle.mission.terrain_xml import read_terrain_xml
-from tussle.world.rays.files import MESHES, SUFFIXES, read_surface, read_texture
+from tussle.world.rays.files import MESHES, SUFFIXES, bytes_of, read_surface, read_texture
 from tussle.world.rays.mesh_parts import read_parts
 from tussle.world.scene import Cuboid, FlatGround, HeightField, Origin, Prism, TriangleMesh, Volume
 
 SCENE_TAGS = ("terrain", "ground", "wall", "building")
 MAX_WALLS = 20_000
+MAPS = (".png", ".jpg", ".jpeg", ".tif", ".tiff")
+"""Ends of the names of maps."""
 TERRAIN = {"position": "m", "scale": "", "cell": "m", "height": "m", "texture": ""}
 WALL = {"center": "m", "lengths": "m", "rpy": "rad"}
 BUILDING = {"corners": "m", "low": "m", "high": "m"}
@@ -61,6 +63,25 @@ class SceneReader:
             "terrain": fields[0] if fields else None,
             "meshes": meshes,
         }
+
+    def map_file(self) -> tuple[Path, str] | None:
+        """Return the picture of the last <map>, and its bounds as text; None without one. That there is no such file is noted."""
+        found = self._each("map", ("bounds",), self._map)
+        return found[-1] if found else None
+
+    def _map(self, node: Node, given: dict[str, str]) -> tuple[Path, str] | None:
+        name = node.text.strip()
+        if not name.lower().endswith(MAPS):
+            raise MissionError(
+                f"{shown(name)} is no picture; it takes {', '.join(MAPS)}, and --map takes tiles, too"
+            )
+        path = self._find(name)
+        if path is None:
+            self.problems.note(node.place, f"<map>: there is no {shown(name)}, so there is no map")
+            return None
+        bytes_of(path)
+        self.files.append(path)
+        return path, given.get("bounds", "")
 
     def mesh_lengths(self, name: str) -> tuple[float, ...]:
         """Lengths of the bounds of a mesh file [m], (3,), for the box of an entity.
@@ -162,14 +183,16 @@ class SceneReader:
         return surface.draped(read_texture(texture))
 
     def _find(self, name: str) -> Path | None:
-        """Return the file with this name in one of the folders; None if there is none.
+        """Return the file with this name in one of the folders, first beside the mission; None if there is none.
 
         Raises:
             MissionError: The file lies outside the folders.
         """
         for candidate in (name, f"{name}.xml"):
             try:
-                path = self.data.find(candidate)
+                # The copy of a run directory counts, also where the command runs in the folder of what was copied.
+                beside = (self.data.beside / candidate).absolute()
+                path = beside if beside.is_file() else self.data.find(candidate)
             except (OSError, ValueError):  # a MissingFileError, or no name of a file
                 continue
             self._inside(path)

@@ -120,6 +120,10 @@ WORLD = {
     "show_plugins": _log("List the plugins.", "false", "truth"),
     "grid_spacing": _viewer("Spacing of the ground grid [m].", "100", "number"),
     "grid_size": _viewer("Size of the ground grid [m].", "10000", "number"),
+    "map": _viewer(
+        "A picture on the ground: a GeoTIFF, or a PNG or JPEG with `bounds`, west, south, east, north [deg] (addition to the format).",
+        attributes="bounds",
+    ),
     "background_color": _viewer("Red, green, blue, 0 to 255."),
     "show_origin": _viewer("Draw the axes.", "false", "truth"),
     "origin_length": _viewer("Length of the axes [m].", "1", "number"),

@@ -236,6 +236,9 @@ class _WorldReader:
         conditions, seed, reseed = self._end_conditions(), self._seed(), self._reseed()
         parts = scene.parts()
         self._settings()
+        self.viewer.pop("map", None)
+        if (found := scene.map_file()) is not None:
+            self.viewer["map"] = {"file": str(found[0]), "bounds": found[1]}
         if entities.viewer:
             self.viewer["entities"] = entities.viewer
         if plugins.viewer:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from tussle.view.frame import Event, Frame, frame_of
+    from tussle.view.ground_map import GroundMap
     from tussle.view.link import OperatorLink
     from tussle.view.live import Live
     from tussle.view.recording import Recording
@@ -19,6 +20,7 @@ __all__ = [
     "MODELS",
     "Event",
     "Frame",
+    "GroundMap",
     "Live",
     "Mesh",
     "OperatorLink",
@@ -33,6 +35,7 @@ _LAZY = {
     "MODELS": "shapes",
     "Frame": "frame",
     "Event": "frame",
+    "GroundMap": "ground_map",
     "Live": "live",
     "OperatorLink": "link",
     "Style": "style",

@@ -25,6 +25,7 @@ from tussle.view.drawn import DrawCollector, Shape
 from tussle.view.entity import EntityState, entity_state
 from tussle.view.feed import MessageFeed, TopicTraffic
 from tussle.view.frame import Event, Frame, FrameReader
+from tussle.view.ground_map import GroundMap
 from tussle.view.latest import LINGER, LatestValue
 from tussle.view.link import OperatorLink
 from tussle.view.orders import fields_from
@@ -73,6 +74,7 @@ class Live:
         link: Over which messages, orders, sticks and settings come to the game; by default they come before the next step.
         specifications: Monitors of the simulation, made before its first step, see `tussle.stress.Monitor`.
         margin: Distance from failure below which there is an alarm, in the SI unit of what a specification compares.
+        ground_map: A map that pictures show on the ground; by default that of the mission file.
 
     Attributes:
         see: Age of what a page shows, by the link [s]. The observations here are of the present.
@@ -97,6 +99,7 @@ class Live:
         link: OperatorLink | None = None,
         specifications: Sequence[SpecificationMonitor] = (),
         margin: float = 1.0,
+        ground_map: GroundMap | None = None,
     ) -> None:
         check_argument("snapshot_every", snapshot_every, POSITIVE)
         check_argument("memory", memory, POSITIVE)
@@ -106,6 +109,7 @@ class Live:
                 f"world = {world!r} is not allowed; there are worlds 0 to {simulation.n_worlds - 1}"
             )
         self.simulation, self.world, self.viewer = simulation, world, dict(viewer or {})
+        self._ground_map = ground_map
         self._clock = simulation.state.context.clock
         self._collector = DrawCollector(simulation, world)
         self._pace = Pace(checked_warp(pace))
@@ -565,7 +569,7 @@ class Live:
     @cached_property
     def scenery(self) -> Scenery:
         """Ground, bases, boundaries and terrain."""
-        return scenery_of(self.simulation.mission, self.viewer)
+        return scenery_of(self.simulation.mission, self.viewer, ground_map=self._ground_map)
 
 
 def _checked_point(name: str, point: Any) -> np.ndarray:

@@ -22,6 +22,7 @@ from tussle.record.plugin_copies import copied_plugins
 from tussle.record.schema import MISSION_FILE, RUN_FILE, SHAPES_FILE, TRAJECTORY_FILE
 from tussle.view.drawn import Shape
 from tussle.view.frame import Event, Frame, empty_frame
+from tussle.view.ground_map import GroundMap
 from tussle.view.scenery import Scenery, scenery_of
 from tussle.view.sight import fields_of_view
 from tussle.view.style import Style
@@ -52,6 +53,7 @@ class Recording:
         plugin_files: Python files with plugins of the run's mission; by default those that the directory holds, if the user's own.
         is_mapped: States stay in their file and are checked when a frame is made of them, so a run of any size opens at once. Extent
             and teams are then those of at most `MAX_SAMPLED` frames, evenly spaced.
+        ground_map: A map that pictures show on the ground; by default that of the mission file.
 
     Attributes:
         run: The run directory as it was loaded.
@@ -77,8 +79,10 @@ class Recording:
         plugin_files: tuple[str | Path, ...] = (),
         *,
         is_mapped: bool = False,
+        ground_map: GroundMap | None = None,
     ) -> None:
         self.path = Path(path)
+        self._ground_map = ground_map
         self.world = world
         self.run: Run = load_run(self.path, is_mapped=is_mapped)
         self._is_mapped = is_mapped
@@ -466,7 +470,7 @@ class Recording:
                 plugin_files=self._plugin_files or self._own_plugins(),
                 plays=False,
             )
-            self.notes.extend(note for note in loaded.notes if "<terrain>" in note)
+            self.notes.extend(note for note in loaded.notes if "<terrain>" in note or "<map>" in note)
             return loaded
         except TussleError as error:
             first = str(error).splitlines()[0]
@@ -518,7 +522,7 @@ class Recording:
     @cached_property
     def scenery(self) -> Scenery:
         """Ground, bases, boundaries and terrain."""
-        return scenery_of(self.mission, self.viewer, self.extent)
+        return scenery_of(self.mission, self.viewer, self.extent, self._ground_map)
 
     def __len__(self) -> int:
         return self.n_frames

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
 from tussle.errors import TussleError
 from tussle.mission import Block, GivenMission, Mission, mission_of
+from tussle.view.ground_map.map_file import GroundMap
+from tussle.view.ground_map.placed import Area
 from tussle.view.shapes import Mesh
 from tussle.view.solids import MAX_FACES, mesh_of, outline_of
 from tussle.view.terrain import Terrain
@@ -30,6 +32,8 @@ from tussle.world.scene import (
 
 MIN_EXTENT = 50.0
 """Least width of the visible box [m]."""
+MIN_MAP_MARGIN = 500.0
+"""Least distance to which a map reaches beyond the visible box [m]: entities may leave it."""
 N_GRID_LINES = 20
 """Approximate number of lines of the default ground grid."""
 
@@ -99,6 +103,7 @@ def scenery_of(
     mission: GivenMission | None,
     viewer: Mapping[str, Any] | None = None,
     extent: tuple[np.ndarray, np.ndarray] | None = None,
+    ground_map: GroundMap | None = None,
 ) -> Scenery:
     """The scenery of a mission.
 
@@ -106,9 +111,11 @@ def scenery_of(
         mission: The mission, the name of one that ships, or a mission file; None if it is unknown, which leaves ground and grid.
         viewer: Viewer tags of the mission file, see `tussle.mission.Loaded`.
         extent: Lower and upper corner of all positions of a game [m], each (3,); by default of the initial positions.
+        ground_map: A map on the ground, in place of the terrain's texture; by default that of the mission file.
 
     Raises:
         MissionError: There is no such mission.
+        ParameterError: The map cannot be read, or has no place in the mission.
     """
     mission = None if mission is None else mission_of(mission, "scenery_of")[0]
     viewer = viewer or {}
@@ -125,11 +132,22 @@ def scenery_of(
         corners += [] if hills is None else _corners_of_field(hills)
     low, high = _at_least(np.array(corners).reshape(-1, 3))
     scene = None if mission is None else mission.scene
+    origin = Origin() if scene is None else scene.origin
+    ground = scene.ground.height if scene is not None and scene.ground is not None else 0.0
+    terrain = None if hills is None else Terrain.of(hills)
+    try:
+        if ground_map is None and "map" in viewer:
+            own = GroundMap.of_mission(viewer["map"])
+            terrain = _mapped(own, origin, terrain, ground, low, high)
+    except TussleError as error:
+        notes.append(f"{error}; the mission's map is not shown")
+    if ground_map is not None:
+        terrain = _mapped(ground_map, origin, terrain, ground, low, high)
     spacing = viewer.get("grid_spacing", 0.0)
     return Scenery(
-        origin=Origin() if scene is None else scene.origin,
+        origin=origin,
         origin_length=_origin_length(viewer, low, high),
-        ground=scene.ground.height if scene is not None and scene.ground is not None else 0.0,
+        ground=ground,
         low=low,
         high=high,
         grid_step=float(spacing) if spacing > 0.0 else _grid_step(low, high),
@@ -146,11 +164,31 @@ def scenery_of(
             )
             for name, team, shape, is_wall in shapes
         ],
-        terrain=None if hills is None else Terrain.of(hills),
+        terrain=terrain,
         background=_background(viewer, notes),
         notes=tuple(notes),
         has_ground=mission is None or _has_ground(mission, hills),
     )
+
+
+def _mapped(
+    ground_map: GroundMap,
+    origin: Origin,
+    terrain: Terrain | None,
+    ground: float,
+    low: np.ndarray,
+    high: np.ndarray,
+) -> Terrain:
+    """The terrain with a map over it; without a terrain, the map flat on the ground, and around the visible box."""
+    if terrain is not None:
+        corners = (terrain.x[0], terrain.y[0]), (terrain.x[-1], terrain.y[-1])
+        area = Area(origin, *corners, float(terrain.height.mean()))
+        return replace(terrain, texture=ground_map.over(area, is_trimmed=False).image)
+    margin = max(MIN_MAP_MARGIN, float((high - low)[:2].max()))
+    area = Area(origin, tuple((low[:2] - margin).tolist()), tuple((high[:2] + margin).tolist()), ground)
+    laid = ground_map.over(area)
+    x, y = (np.array([laid.low[i], laid.high[i]]) for i in range(2))
+    return Terrain(x, y, np.full((2, 2), ground), laid.image)
 
 
 def _has_ground(mission: Mission, hills: HeightField | None) -> bool:
@@ -177,13 +215,34 @@ def _shapes(mission: Mission, notes: list[str]) -> list[tuple[str, int | None, V
         if len(mesh.faces) > MAX_FACES:
             notes.append(f"mesh {i} has {len(mesh.faces):,} triangles; {MAX_FACES:,} of them are shown")
     found += [(f"wall {i + 1}", None, shape, True) for i, shape in enumerate(scene.walls)]
-    found += [(p.instance_name, r.team, r.shape, False) for p in mission.interactions for r in p.regions()]
+    roles = _roles(mission)
+    for p in mission.interactions:
+        found += [(_region_name(p, r.boundary, roles), r.team, r.shape, False) for r in p.regions()]
     for plugin in mission.interactions:
         try:
             found += [("", None, wall, True) for wall in plugin.walls()]
         except TussleError as error:  # the file of a recorded run's map may be elsewhere
             notes.append(f"{error}; its walls are not shown")
     return found
+
+
+def _roles(mission: Mission) -> dict[int, set[str]]:
+    """Uses of boundaries by their ids: "flag" of one that a plugin's `flag_boundary_id` names."""
+    roles: dict[int, set[str]] = {}
+    for plugin in mission.interactions:
+        for name, value in plugin.values.items():
+            if name.endswith("_boundary_id"):
+                roles.setdefault(int(value), set()).add(name.removesuffix("_boundary_id"))
+    return roles
+
+
+def _region_name(plugin: Any, boundary: int, roles: Mapping[int, set[str]]) -> str:
+    """Name of a region: that of its plugin, with its id where the mission gives none, and its uses: "Boundary 2 (capture)"."""
+    name = str(plugin.instance_name)
+    if name == type(plugin).__name__:
+        name = f"{name} {boundary}"
+    uses = sorted(roles.get(boundary, set()) - {name})
+    return f"{name} ({', '.join(uses)})" if uses else name
 
 
 def _corners(shape: Volume | TriangleMesh) -> list[np.ndarray]:

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from tussle.errors import ParameterError
-from tussle.numeric import atan2, cos, sin
+from tussle.numeric import atan2, cos, sin, total
 from tussle.numeric.quaternion import quat_from_euler, quat_multiply, quat_rotate, quat_rotate_inverse
 
 # NGA.STND.0036, Department of Defense World Geodetic System 1984 (2014), table 3.1: both are defining and exact.
@@ -27,6 +27,8 @@ SECOND_ECCENTRICITY_SQUARED = ECCENTRICITY_SQUARED / (1.0 - ECCENTRICITY_SQUARED
 # Bowring's first step is accurate to 1e-9 rad from 100 km below the ground to far above it; each further step gains more digits
 # than that, so the second reaches rounding error and the third is a margin for orbits.
 LATITUDE_STEPS = 3
+CENTRAL_SCALE, FALSE_EASTING, FALSE_NORTHING = 0.9996, 500_000.0, 10_000_000.0
+"""UTM: NGA.SIG.0012, The Universal Grids and the Transverse Mercator and Polar Stereographic Map Projections (2014), section 7."""
 FORWARD_RIGHT_DOWN = 0.0, 1.0, 0.0, 0.0
 """Rotation from forward-right-down to forward-left-up body axes, and back: half a turn about the axis forward."""
 
@@ -121,6 +123,11 @@ class Origin:
         return np.stack([atan2(rise, run), atan2(y, x), altitude])
 
     @property
+    def is_default(self) -> bool:
+        """True if it is the place of a mission that sets none."""
+        return self == Origin()
+
+    @property
     def earth_centred(self) -> tuple[float, float, float]:
         """Its position in Earth-centred axes: equator at longitude 0, at 90 degrees east, north pole [m]."""
         return self._frame[1]
@@ -158,6 +165,35 @@ class Origin:
 def to_forward_right_down(quat: np.ndarray, vector: np.ndarray) -> np.ndarray:
     """Vectors of the world frame, (3, n), in forward-right-down axes, (3, n), of bodies with the attitudes quat, (4, n)."""
     return np.asarray(quat_rotate_inverse(quat_multiply(quat, FORWARD_RIGHT_DOWN), vector))
+
+
+def utm(latitude: Any, longitude: Any, zone: int, is_south: bool, maths: Any = math) -> tuple[Any, Any]:
+    """Return easting and northing [m]. L. Krueger (1912), fourth order: the error is below 1 um inside the zone.
+
+    Args:
+        latitude: Of a point [rad]; with `maths` = numpy of points, (n,).
+        longitude: As well [rad].
+        zone: 1 to 60.
+        is_south: Whether northings count from the pole, as in zones of the southern hemisphere.
+        maths: Module whose functions are used, math or numpy.
+    """
+    n = FLATTENING / (2.0 - FLATTENING)
+    radius = SEMI_MAJOR / (1.0 + n) * (1.0 + n**2 / 4.0 + n**4 / 64.0)
+    alpha = (
+        n / 2.0 - 2.0 * n**2 / 3.0 + 5.0 * n**3 / 16.0 + 41.0 * n**4 / 180.0,
+        13.0 * n**2 / 48.0 - 3.0 * n**3 / 5.0 + 557.0 * n**4 / 1440.0,
+        61.0 * n**3 / 240.0 - 103.0 * n**4 / 140.0,
+        49561.0 * n**4 / 161280.0,
+    )
+    away = longitude - math.radians(6.0 * zone - 183.0)
+    sine, e = maths.sin(latitude), math.sqrt(FLATTENING * (2.0 - FLATTENING))
+    t = maths.sinh(maths.atanh(sine) - e * maths.atanh(e * sine))
+    xi, eta = maths.atan2(t, maths.cos(away)), maths.atanh(maths.sin(away) / maths.hypot(1.0, t))
+    north = xi + total(a * maths.sin(2 * j * xi) * maths.cosh(2 * j * eta) for j, a in enumerate(alpha, 1))
+    east = eta + total(a * maths.cos(2 * j * xi) * maths.sinh(2 * j * eta) for j, a in enumerate(alpha, 1))
+    return FALSE_EASTING + CENTRAL_SCALE * radius * east, CENTRAL_SCALE * radius * north + (
+        FALSE_NORTHING if is_south else 0.0
+    )
 
 
 def _earth_centred(

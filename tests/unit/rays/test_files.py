@@ -14,9 +14,9 @@ import pytest
 from tussle import Simulation
 from tussle.errors import MissingExtraError, MissionError, ParameterError, TussleError
 from tussle.mission import read_mission, to_python, to_xml
-from tussle.mission.terrain_xml import utm
 from tussle.scene import Cuboid, FlatGround, HeightField, Origin, Prism
 from tussle.view import scenery_of
+from tussle.world.geodesy import utm
 from tussle.world.rays.files import read_surface
 
 GRID = """ncols 3
@@ -413,12 +413,14 @@ def test_a_terrain_that_is_elsewhere_is_noted(tmp_path):
 
 
 def test_terrain_xml_in_utm(folder):
-    east, north = utm(Origin.from_degrees(0.0, -87.0), 16, is_south=False)
+    east, north = utm(0.0, np.radians(-87.0), 16, is_south=False)
     assert (east, north) == pytest.approx((500_000.0, 0.0), abs=1e-6)
     # The CN Tower at 43 38 33.24 N, 79 23 13.7 W: 17T 630084 4833438, as published (to the metre).
     tower = Origin.from_degrees(43 + 38 / 60 + 33.24 / 3600, -(79 + 23 / 60 + 13.7 / 3600))
-    assert utm(tower, 17, is_south=False) == pytest.approx((630_084.0, 4_833_438.0), abs=1.0)
-    assert utm(tower, 17, is_south=True)[1] == pytest.approx(14_833_438.0, abs=1.0)
+    assert utm(tower.latitude, tower.longitude, 17, is_south=False) == pytest.approx(
+        (630_084.0, 4_833_438.0), abs=1.0
+    )
+    assert utm(tower.latitude, tower.longitude, 17, is_south=True)[1] == pytest.approx(14_833_438.0, abs=1.0)
     (folder / "tent.xml").write_text(
         "<params><polydata>tent.vtk</polydata><zone>16</zone><origin_offset_z>2</origin_offset_z></params>"
     )

@@ -18,6 +18,7 @@ from tussle.view.page.settings import differing_settings
 from tussle.view.scenery import Scenery
 from tussle.view.sight import Sight
 from tussle.view.style import Colour, Style
+from tussle.world.geodesy import Origin
 
 if TYPE_CHECKING:
     from tussle.view.recording import Recording
@@ -150,6 +151,8 @@ class Comparison:
         """Return the scenery of the first run, with that of the second if they are shown side by side."""
         one, other = self.a.scenery, self.b.scenery
         low, high = np.minimum(one.low, other.low + self.shift), np.maximum(one.high, other.high + self.shift)
+        if one.origin != other.origin or self.shift.any():
+            one = replace(one, origin=Origin())  # a place on the page is not one on Earth
         if not self.shift.any():
             return replace(one, low=low, high=high)
         bases = [

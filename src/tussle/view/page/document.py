@@ -171,8 +171,11 @@ def event_rows(events: Iterable[Event]) -> list[list[Any]]:
 
 def scenery_data(scenery: Scenery) -> dict[str, Any]:
     """Extent, grid, axes, bases, regions and background; of the terrain, what `scenery_blobs` adds."""
-    digits = digits_for(scenery.size)
+    digits, origin = digits_for(scenery.size), scenery.origin
     return {
+        "origin": None
+        if origin.is_default
+        else [math.degrees(origin.latitude), math.degrees(origin.longitude), origin.altitude],
         "low": rounded(scenery.low, digits),
         "high": rounded(scenery.high, digits),
         "ground": scenery.ground,

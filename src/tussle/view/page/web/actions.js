@@ -14,7 +14,7 @@ export function actionsOf(player) {
     showSettings(player);
     player.look();
   };
-  const flip = (/** @type {'labels' | 'grid' | 'links'} */ name) => change(() => { drawn[name] = !drawn[name]; });
+  const flip = (/** @type {'grid' | 'links'} */ name) => change(() => { drawn[name] = !drawn[name]; });
   const shift = (/** @type {'scale' | 'text'} */ name, /** @type {number} */ step) => change(() => {
     const { min, max } = field(RANGES[name]);
     drawn[name] = Math.max(Number(min), Math.min(Number(max), drawn[name] + step));
@@ -77,7 +77,7 @@ export function actionsOf(player) {
     usualSize: change(() => { drawn.scale = 0; }),
     trails: trail((i) => (i + 1) % TRAIL_LENGTHS.length),
     shorterTrails: trail((i) => Math.max(0, i - 1)),
-    labels: flip('labels'),
+    labels: change(() => showLabels(drawn, !drawn.labels)),
     largerText: shift('text', 1),
     smallerText: shift('text', -1),
     wire: change(() => { drawn.wire = true; }),
@@ -99,6 +99,11 @@ export function actionsOf(player) {
     close: () => /** @type {HTMLDialogElement | null} */ (document.querySelector('dialog[open]'))?.close(),
     settings: () => { byId('settings').hidden = !byId('settings').hidden; },
   };
+}
+
+/** Show or hide the names of entities and of the mission's areas; at first, those of many entities are hidden. @param {Drawn} drawn @param {boolean} are */
+function showLabels(drawn, are) {
+  drawn.labels = drawn.names = are;
 }
 
 /** @param {number} i */
@@ -124,6 +129,7 @@ export function listenToSettings(player) {
     });
   };
   for (const name of CHECKS) listen(name, 'change', ({ checked }) => { drawn[name] = checked; });
+  listen('labels', 'change', ({ checked }) => showLabels(drawn, checked));
   for (const name of NUMBERS) listen(name, 'change', (input) => { if (input.value !== '' && input.checkValidity()) drawn[name] = Number(input.value); });
   for (const [name, id] of /** @type {['trail' | 'scale' | 'text', string][]} */ (Object.entries(RANGES))) {
     listen(id, 'input', ({ value }) => {

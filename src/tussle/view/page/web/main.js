@@ -40,6 +40,8 @@ function publish(player) {
       const { t, v } = layer.series.of(name, team, id);
       return t.map((time, i) => [time, v[i]]);
     },
+    /** Texts in the picture. */
+    get texts() { return [...picture.overlay.texts]; },
     get shapes() { return picture.shapes.header.parts.map(({ kind, n }) => [kind, n]); },
     get trailPoints() { return picture.trails.n; },
     /** Place of an entity [m], and its attitude (w, x, y, z); null where it is not there. @param {number} id */

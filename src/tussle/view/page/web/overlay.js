@@ -21,6 +21,8 @@ export class Overlay {
     this.ratio = 1;
     /** Boxes of the texts that are there. @type {number[][]} */
     this.taken = [];
+    /** These texts. @type {string[]} */
+    this.texts = [];
     this.ink = '';
     this.paper = '';
   }
@@ -34,6 +36,7 @@ export class Overlay {
     this.pen.clearRect(0, 0, width, height);
     this.ratio = ratio;
     this.taken = [];
+    this.texts = [];
     this.ink = styled('--ink');
     this.paper = styled('--ground');
     this.family = getComputedStyle(document.body).fontFamily;
@@ -51,6 +54,7 @@ export class Overlay {
     const isFree = this.taken.every(([a, b, c, d]) => left > c || right < a || top > d || bottom < b);
     if (!isFree && !must) return false;
     this.taken.push([left, top, right, bottom]);
+    this.texts.push(text);
     pen.lineWidth = 3 * ratio;
     pen.lineJoin = 'round';
     pen.strokeStyle = this.paper;

@@ -2,6 +2,7 @@
 /** @import { Colour, Mode, PageData, Status, Team } from './types' */
 
 import { amount, byId, cleared, element, fillList, length, number, rgb, say, styled } from './formatting.js';
+import { geodeticOf, sidesOf } from './geodesy.js';
 import { between, forward, minus, norm } from './geometry.js';
 import { NO_TEAM } from './layer.js';
 import { Live } from './live.js';
@@ -243,12 +244,15 @@ export class Panels {
   stateOf(slot) {
     const { layer: { shown }, page } = this;
     const isSecond = page.shift && shown.id[slot] > page.idShift;
-    const [east, north, up] = minus(shown.placeIn(slot), isSecond ? page.shift : [0, 0, 0]);
+    const place = minus(shown.placeIn(slot), isSecond ? page.shift : [0, 0, 0]);
+    const [east, north, up] = place;
+    const geodetic = page.scenery.origin && geodeticOf(page.scenery.origin, place);
     const nose = forward(shown.quat.subarray(4 * slot, 4 * slot + 4));
     const heading = ((Math.atan2(nose[1], nose[0]) * 180) / Math.PI + 360) % 360;
     const health = shown.health[slot];
     return [
       ['East', `${number(east, 1)} m`], ['North', `${number(north, 1)} m`], ['Up', `${number(up, 1)} m`],
+      .../** @type {[string, string][]} */ (geodetic ? ['Latitude', 'Longitude'].map((name, i) => [name, sidesOf(geodetic)[i]]) : []),
       ['Speed', `${number(norm(this.layer.velocity(shown.id[slot])), 1)} m/s`], ['Heading', `${number(heading)}°`],
       ['Health', number(health, health < 10 ? 2 : 0).replace(/(\.\d*?)0+$/, '$1').replace(/\.$/, '')],
     ];

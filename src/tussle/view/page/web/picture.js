@@ -4,6 +4,7 @@
 
 import { byId, element, length, parseColour, say, styled } from './formatting.js';
 import { add, between, minus, norm, scaled } from './geometry.js';
+import { geodeticOf, sidesOf } from './geodesy.js';
 import { pixelOf, placeBehind } from './camera.js';
 import { Renderer } from './renderer.js';
 import { Entities } from './models.js';
@@ -34,6 +35,8 @@ export class Picture {
     this.isHalf = false;
     /** @type {View | null} */
     this.view = null;
+    /** Pixel of the window that the pointer is at. @type {number[] | null} */
+    this.pointer = null;
     this.setTheme(page.scenery.background ? 'mission' : window.matchMedia('(prefers-color-scheme: light)').matches ? 'light' : 'dark');
   }
 
@@ -113,6 +116,20 @@ export class Picture {
     return share > 0 && share < Infinity ? add(eye, scaled(way, share)) : null;
   }
 
+  /** The pointer has moved to a pixel of the window, or away from it. @param {number[] | null} pixel */
+  pointAt(pixel) {
+    this.pointer = pixel;
+    this.showPointer();
+  }
+
+  /** Say where on Earth the ground at the pointer is. */
+  showPointer() {
+    const { origin } = this.scenery.data;
+    const place = origin && this.pointer && this.view && this.groundAt(this.pointer[0], this.pointer[1]);
+    const geodetic = place && geodeticOf(origin, place);
+    say(byId('pointer'), geodetic ? sidesOf(geodetic).join(', ') : '');
+  }
+
   // -- drawing --------------------------------------------------------------------------------------------------------------------
 
   draw() {
@@ -165,11 +182,12 @@ export class Picture {
     const first = [chosen, hovered].map((id) => (id ? layer.slotOf(id) : -1)).filter((each) => each >= 0);
     overlay.labels(view, layer, first, drawn.labels ? this.slots() : [], size, (each, depth) => this.pixelsOf(each, depth));
     for (const [text, ...place] of drawn.shapes ? this.shapes.header.texts : []) overlay.writeAt(view, place, text, overlay.ink, size, { must: true, gap: 0 });
-    for (const { name, colour, top } of drawn.regions ? scenery.regions : []) overlay.writeAt(view, top, name, overlay.soft(colour), 12);
+    for (const { name, colour, top } of drawn.names && drawn.regions ? [...scenery.bases, ...scenery.regions] : []) overlay.writeAt(view, top, name, overlay.soft(colour), 12);
     for (const { name, colour, end } of drawn.grid ? scenery.ends : []) overlay.writeAt(view, end, name, overlay.soft(colour), 11, { gap: 3 });
     for (const [text, place] of this.player.page.signs || []) overlay.writeAt(view, place, text, overlay.ink, 16, { must: true, gap: 0 });
     const { spacing, nearer } = scenery.cell(view);
     const where = scenery.data.hasGround ? '' : ', no ground';
+    this.showPointer();
     say(byId('scale'), drawn.grid ? `grid ${length(nearer > 0.4 ? spacing : 10 * spacing)}${where}` : '');
   }
 

@@ -70,7 +70,7 @@ export class Player {
     this.shapes = null;
     /** @type {Drawn} */
     this.drawn = {
-      scale: 0, trail: 0, text: 0, labels: false, wire: false, least: true, grid: true, regions: true, shapes: true, rings: false,
+      scale: 0, trail: 0, text: 0, labels: false, names: true, wire: false, least: true, grid: true, regions: true, shapes: true, rings: false,
       cones: false, links: false, ringRadius: reach, coneRange: reach, coneAngle: 60, linkRange: reach,
     };
     this.isCalm = window.matchMedia('(prefers-reduced-motion: reduce)').matches;

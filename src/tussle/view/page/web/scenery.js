@@ -38,7 +38,8 @@ export class Scenery {
     this.bases = scenery.bases.filter(({ opacity }) => opacity > 0).map(({ pos, radius, team, opacity }) => {
       const colour = colourOf(team);
       circle(pos, radius, CIRCLE).forEach((place, i) => this.outlines.add(place, 0, colour, i < CIRCLE));
-      return { model: ball, pos, radius, colour, opacity: 0.35 * opacity };
+      const name = `base of ${teams.find(({ id }) => id === team)?.name || `team ${team}`}`;
+      return { model: ball, pos, radius, colour, name, top: add(pos, [0, 0, radius]), opacity: 0.35 * opacity };
     });
     this.outlines.upload();
     /** @type {TerrainMesh | null} */

@@ -20,7 +20,10 @@ export class Steering {
     canvas.addEventListener('pointermove', (event) => this.move(event));
     canvas.addEventListener('pointerup', (event) => this.release(event));
     canvas.addEventListener('pointercancel', (event) => this.release(event));
-    canvas.addEventListener('pointerleave', () => player.hover(0));
+    canvas.addEventListener('pointerleave', () => {
+      player.hover(0);
+      player.picture.pointAt(null);
+    });
     canvas.addEventListener('wheel', (event) => this.wheel(event), { passive: false });
     canvas.addEventListener('contextmenu', (event) => event.preventDefault());
     canvas.addEventListener('dblclick', (event) => event.preventDefault());
@@ -40,6 +43,7 @@ export class Steering {
   /** @param {PointerEvent} event */
   move(event) {
     const { player } = this;
+    player.picture.pointAt([event.clientX, event.clientY]);
     const was = this.down.get(event.pointerId);
     if (!was) return player.hover(player.picture.whoIsAt(event.clientX, event.clientY));
     const now = { x: event.clientX, y: event.clientY };

@@ -20,6 +20,8 @@ export type EventRow = [t: number, kind: string, id: number, other: number, text
 
 export interface Terrain { x: number[]; y: number[]; low: number; step: number; hasTexture: boolean; }
 export interface SceneryData {
+  /** Latitude and longitude [degrees] and height above the ellipsoid [m]; null without an origin. */
+  origin: number[] | null;
   low: number[]; high: number[]; ground: number; hasGround: boolean; gridStep: number; originLength: number; background: number[] | null;
   bases: { team: number; pos: number[]; radius: number; opacity: number }[];
   regions: { name: string; team: number | null; isWall: boolean; mesh: Mesh; outline: number[]; nParts: number }[];
@@ -90,6 +92,6 @@ export interface View {
 export interface Sample { t: number; ids(): Iterable<number>; placeOf(id: number): number[] | null; }
 /** What is drawn and how, as the settings have it. */
 export interface Drawn {
-  scale: number; trail: number; text: number; labels: boolean; wire: boolean; least: boolean; grid: boolean; regions: boolean; shapes: boolean;
+  scale: number; trail: number; text: number; labels: boolean; names: boolean; wire: boolean; least: boolean; grid: boolean; regions: boolean; shapes: boolean;
   rings: boolean; cones: boolean; links: boolean; ringRadius: number; coneRange: number; coneAngle: number; linkRange: number;
 }
