@@ -112,7 +112,9 @@ def test_a_motor_that_is_stuck_at_a_known_time():
         flight("right", 5.0, -1.0),
         flight("far", 500.0, controller=harmless),
     ]
-    _, why = explained(Mission(blocks=blocks, end=8, dt=0.1), "always (distance(left, right) > 1 m)", 1, branches=20)
+    _, why = explained(
+        Mission(blocks=blocks, end=8, dt=0.1), "always (distance(left, right) > 1 m)", 1, branches=20
+    )
     assert why.causes == ["plugin left.ActuatorFault"]
     assert row(why, "plugin", "far.Harmless").n_failed == 20
     assert (why.open_step, why.lost_step, why.saved, why.saved_step) == (None, 0, None, None)
