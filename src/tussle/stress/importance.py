@@ -25,9 +25,11 @@ from tussle.stress.games import Played
 DRAW = stream_key("stress", "importance")
 ELITE = 0.1
 """Part of the games of a round to which the next proposal is fitted."""
+FAILING, ROUNDS_REACHED = 0.05, 3
+"""Part of the games of a round that fail, from which on proposals are fitted to failing games, and rounds from there to the last fit."""
 SHARES, SCALES = (0.1, 0.6, 0.3), (1.3, 4.0)
 """Parts of the nominal distribution, of fitted Gaussians and of wider ones; by what the covariances of the latter two are multiplied."""
-LEAST_VARIANCE = 0.01
+MIN_VARIANCE = 0.01
 CUT = 10.0
 """Weights above so many times their median are cut in a fit."""
 SEARCHES = 2
@@ -161,7 +163,7 @@ def _covariance(u: np.ndarray, share: np.ndarray) -> np.ndarray:
     """Covariance of weighted points, (d, d); few points know little of correlations, and of variances."""
     d, apart = u.shape[1], u - share @ u
     found = (share[:, None] * apart).T @ apart
-    spread = np.maximum(np.diag(found), LEAST_VARIANCE)
+    spread = np.maximum(np.diag(found), MIN_VARIANCE)
     kept = max(0.0, 1.0 - (d + 1) * float(total(share * share)))
     return np.asarray(kept * found + np.diag(spread - kept * np.diag(found)))
 
@@ -206,22 +208,24 @@ def _searched(
     robustness_of: Robustness, d: int, per_round: int, seed: int, number: int, n_before: int
 ) -> tuple[Proposal, list[float]]:
     """A proposal whose games fail often, and the levels of its rounds."""
-    proposal, levels, is_reached = Proposal(d), list[float](), False
+    proposal, levels, n_reached = Proposal(d), list[float](), 0
     while len(levels) < MAX_ROUNDS:
         u = proposal.draw(_draws(seed, per_round, len(levels), number, d))
         robustness = robustness_of(u, n_before + per_round * len(levels))
-        if not levels and (robustness < 0.0).all():
+        has_failed = robustness < 0.0
+        if not levels and has_failed.all():
             raise ParameterError(
                 f"all of {per_round:,} games fail with values of the given distributions: nothing is rare"
             )
-        level = float(np.sort(robustness)[math.ceil(ELITE * per_round) - 1])
-        was_reached, is_reached = is_reached, level < 0.0
-        levels.append(level)
-        is_elite = robustness < 0.0 if is_reached else robustness <= level
-        proposal.fit(u[is_elite], _cut(proposal.weights(u)[is_elite]))
-        if is_reached and was_reached:
+        levels.append(float(np.sort(robustness)[math.ceil(ELITE * per_round) - 1]))
+        is_reached = np.count_nonzero(has_failed) >= FAILING * per_round
+        if is_reached or not n_reached:  # a round with few failures after one with many teaches nothing
+            is_elite = has_failed if is_reached else robustness <= levels[-1]
+            proposal.fit(u[is_elite], _cut(proposal.weights(u)[is_elite]))
+        n_reached += bool(is_reached or n_reached)
+        if n_reached == ROUNDS_REACHED:
             return proposal, levels
-        if len(levels) > MAX_IDLE and min(levels[-MAX_IDLE:]) >= max(min(levels[:-MAX_IDLE]), 0.0):
+        if not n_reached and len(levels) > MAX_IDLE and min(levels[-MAX_IDLE:]) >= min(levels[:-MAX_IDLE]):
             break
     raise ParameterError(
         f"no failure was found: the nearest tenth of {per_round * len(levels):,} games stays at a robustness of {min(levels):.6g}, and "
