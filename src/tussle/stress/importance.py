@@ -62,7 +62,7 @@ class ImportanceEstimate:
         greatest: Part of the greatest weight in the estimate.
         means: Middles of the Gaussians of the last proposal, as standard normal numbers, (k, d).
         error: Standard error of the estimate.
-        failures: Failing games of the last sample, those with the greatest weight first.
+        failures: Failing games of the last sample, the worst first.
         notes: What to know about the result.
         game_s: Length of all games [s].
         cpu_s: Their CPU time [s].

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -10,7 +11,7 @@ import numpy as np
 
 from tussle.batch.statistics import wilson
 from tussle.engine.simulation import Simulation
-from tussle.errors import TussleError
+from tussle.errors import BatchError, TussleError
 from tussle.mission import Mission
 from tussle.mission.rekeys import RekeyTarget
 from tussle.numeric.rng import stream_key
@@ -280,7 +281,14 @@ class Explanation:
             keys = [stream_key("stress", "without", f"{game.name} {lost} {i}") for i in range(self._n - 1)]
             kind = "messages" if change[0].startswith("reach") else change[0]
             asked.append(((kind, _label(change), lost), [game, *(game.branch(lost, key) for key in keys)]))
-        return self._rows(asked)
+        try:
+            return self._rows(asked)
+        except BatchError:  # with other luck, a game without something may fail with an error
+            rows: list[Counterfactual] = []
+            for each in asked:
+                with suppress(BatchError):
+                    rows += self._rows([each])
+            return rows
 
     def _is_playable(self, game: StressGame) -> bool:
         try:

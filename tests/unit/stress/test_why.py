@@ -203,6 +203,27 @@ def test_losses_of_a_team():
     assert row(why, "luck", "RandomAttrit///lot").n_failed == 20
 
 
+class Needs(Interaction):
+    """Fails with an error, sometimes, where a block is missing; looks on otherwise."""
+
+    grade = "portable"
+
+    def step(self, w):
+        if w.n < 5 and (w.uniform("trouble") > 0.99).any() and (w.t > 2.5).any():
+            raise ValueError("an entity is missing")
+
+
+def test_what_ends_with_an_error_has_no_row():
+    mission = gusty().replace(interactions=[Needs()], end=4)
+    study = Stress(mission, GUSTY)
+    played = study.sample(600, processes=1).games
+    early = next(p for p in played if p.verdict.has_failed and p.verdict.first_below(0.0) < 20)
+    why = study.why(early, branches=20, processes=1)
+    assert not [each for each in why.rows if (each.kind, each.name) == ("entity", "crowd")]
+    assert row(why, "plugin", "Needs").n_failed >= 17
+    assert "luck left" in why.causes
+
+
 def test_what_is_not_explained():
     study = Stress(gusty(), GUSTY)
     good = next(p for p in study.sample(5, processes=1).games if not p.verdict.has_failed)
