@@ -209,7 +209,8 @@ class Needs(Interaction):
     grade = "portable"
 
     def step(self, w):
-        if w.n < 5 and (w.uniform("trouble") > 0.99).any() and (w.t > 2.5).any():
+        is_short = np.bincount(w.world, minlength=w.n_worlds) < 5
+        if (is_short & (w.t > 2.5) & (w.uniform("trouble") > 0.99)).any():
             raise ValueError("an entity is missing")
 
 
