@@ -207,9 +207,19 @@ class StressOptions(ManyGamesOptions):
     probability: Annotated[
         bool, flag("--probability", "Estimate how likely a failure is, however rare, by games that branch.")
     ] = False
+    importance: Annotated[
+        bool,
+        flag(
+            "--importance",
+            "With --probability and --vary NAME='normal(10, 2)', lognormal or uniform: importance sampling of these values.",
+        ),
+    ] = False
     why: Annotated[
         bool,
-        flag("--why", "Show why and when the worst failing game was lost: what undoes the failure, by branches of it."),
+        flag(
+            "--why",
+            "Show why and when the worst failing game was lost: what undoes the failure, by branches of it.",
+        ),
     ] = False
     shrink: Annotated[
         bool,
@@ -251,9 +261,13 @@ class StressOptions(ManyGamesOptions):
             )
         if self.junit is not None and self.holds is None:
             raise typer.BadParameter("--junit needs --holds: the probability above which the test passes")
+        if self.importance and (not self.probability or not self.vary or self.against is not None):
+            raise typer.BadParameter(
+                "--importance needs --probability, and --vary with distributions, as NAME='normal(10, 2)'; it does not compare missions"
+            )
         if self.is_search and (self.probability or self.holds is not None):
             raise typer.BadParameter(
-                "--probability and --holds are for one mission with one set of values; not with --vary and --against"
+                "--probability and --holds are for one mission with one set of values; not with --vary and --against, but for --importance"
             )
         if not self.spec:
             raise typer.BadParameter(
@@ -263,7 +277,7 @@ class StressOptions(ManyGamesOptions):
     @property
     def is_search(self) -> bool:
         """Values are searched, or two missions compared."""
-        return bool(self.vary) or self.against is not None
+        return (bool(self.vary) and not self.importance) or self.against is not None
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -23,11 +23,13 @@ from tussle.mission import Mission, to_xml
 from tussle.record.run_file import put_whole
 from tussle.stress.chances import Chance
 from tussle.stress.confidence import Assurance, junit_xml
+from tussle.stress.estimates import Probability, Sample
 from tussle.stress.games import Played
+from tussle.stress.importance import ImportanceEstimate
 from tussle.stress.results import FAILURES, MAX_FAILURES, saved_file
 from tussle.stress.search import FailureSearch, label
 from tussle.stress.shrink import SmallestGame
-from tussle.stress.study import Probability, Sample, Stress
+from tussle.stress.study import Stress
 from tussle.stress.why import Why
 
 KINDS = {"luck": "luck of", "entity": "without", "plugin": "without", "messages": "messages of"}
@@ -84,6 +86,9 @@ def stress(options: StressOptions) -> int:
                     **how,
                 )
                 failures = [game.played for game in searched.failures]
+            elif options.importance:
+                weighted = study.importance(options.games, directory=directory, **how)
+                failures = weighted.failures
             elif options.probability:
                 found = study.probability(options.particles, options.repetitions, directory=directory, **how)
                 failures = found.failures
@@ -100,6 +105,8 @@ def stress(options: StressOptions) -> int:
             return interrupt.code
     if options.is_search:
         show_search(searched, study, directory, options)
+    elif options.importance:
+        show_importance(weighted, study, directory, options)
     elif options.probability:
         show_probability(found, study, directory, options)
     else:
@@ -110,7 +117,8 @@ def stress(options: StressOptions) -> int:
         show_smallest(study.smallest(failures[0]), study, directory, options)
     if options.holds is None:
         return OK
-    return judge(found if options.probability else sample, study, directory, options)
+    judged = weighted if options.importance else found if options.probability else sample
+    return judge(judged, study, directory, options)
 
 
 def other_of(against: str | None) -> str | dict[str, str] | None:
@@ -120,7 +128,9 @@ def other_of(against: str | None) -> str | dict[str, str] | None:
     return read_settings(against.split(","))
 
 
-def judge(found: Sample | Probability, study: Stress, directory: Path, options: StressOptions) -> int:
+def judge(
+    found: Sample | Probability | ImportanceEstimate, study: Stress, directory: Path, options: StressOptions
+) -> int:
     """Say whether the specification holds as it is asked to, write that as JUnit XML, and return the exit code."""
     asked, assurance = float(options.holds or 0.0), Assurance.of(found)
     if options.junit is not None:
@@ -205,6 +215,36 @@ def show_probability(found: Probability, study: Stress, directory: Path, options
             ]
         ),
     )
+    show_failures(found.failures, study, directory, options)
+    for note in found.notes:
+        say_note(note)
+
+
+def show_importance(
+    found: ImportanceEstimate, study: Stress, directory: Path, options: StressOptions
+) -> None:
+    """Show the probability of a failure, and how far it can be trusted."""
+    plain = (
+        f"; plain games would be {found.n_plain:,.0f} for the same error"
+        if math.isfinite(found.n_plain)
+        else ""
+    )
+    weights = f"{found.effective:,.0f} effective failing games of {found.n_failed:,}; the greatest weight is {found.greatest:.1%} of all"
+    put(
+        "",
+        title(study.batch.name, str(study.specification), "importance sampling"),
+        fact_list(
+            [
+                ("probability of failure", share(found.value, found.low, found.high)),
+                ("games", f"{found.n_games:,}, {found.n:,} of them for the estimate{plain}"),
+                ("weights", weights if found.n_failed else ""),
+                ("time", f"{found.game_s:,.0f} s of games in {found.cpu_s:,.1f} s of CPU time"),
+                ("study", str(directory)),
+            ]
+        ),
+    )
+    for number, each in enumerate(found.failures[:MAX_SHOWN]):
+        put(f" {FAILURES}/{number}.xml: {label(dict(each.game.values))}")
     show_failures(found.failures, study, directory, options)
     for note in found.notes:
         say_note(note)

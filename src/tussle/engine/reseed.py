@@ -8,7 +8,7 @@ import numpy as np
 
 from tussle.api.context import Redraw
 from tussle.engine.state import SimulationState
-from tussle.mission.rekeys import Rekeys, Target, check_targets, checked_rekeys
+from tussle.mission.rekeys import Rekeys, RekeyTarget, check_targets, checked_rekeys
 from tussle.numeric.rng import stream_key
 
 DERIVED = np.uint64(stream_key("reseed"))
@@ -55,7 +55,7 @@ def _use(state: SimulationState, keys: np.ndarray, ahead: int) -> None:
             if step >= context.clock.step[world] + ahead:
                 break
             if target:
-                own.append(_redraw(state, world, key, Target.parse(target[0])))
+                own.append(_redraw(state, world, key, RekeyTarget.parse(target[0])))
             else:
                 keys[world] = key
                 own.clear()
@@ -68,7 +68,7 @@ def _use(state: SimulationState, keys: np.ndarray, ahead: int) -> None:
                 view.renew()
 
 
-def _redraw(state: SimulationState, world: int, key: int, target: Target) -> Redraw:
+def _redraw(state: SimulationState, world: int, key: int, target: RekeyTarget) -> Redraw:
     names = state.context.block_names
     if target.owner in names:
         block = names.index(target.owner)

@@ -30,7 +30,7 @@ TAKES = (
 TARGET = "a target is a world plugin, a block, or BLOCK/NUMBER/PLUGIN/LABEL, of which what is not meant is left empty or out"
 
 
-class Target(NamedTuple):
+class RekeyTarget(NamedTuple):
     """Whose draws a re-key is for.
 
     Attributes:
@@ -46,7 +46,7 @@ class Target(NamedTuple):
     label: str = ""
 
     @classmethod
-    def parse(cls, text: str) -> Target:
+    def parse(cls, text: str) -> RekeyTarget:
         """Read "left", "left/2", "left//Hover/gust"; parts are quoted as in a URL.
 
         Raises:
@@ -89,7 +89,7 @@ def checked_rekeys(value: Any) -> Rekeys:
 def _target(value: Any) -> str:
     if not isinstance(value, str):
         raise TypeError
-    return str(Target.parse(value))
+    return str(RekeyTarget.parse(value))
 
 
 def check_targets(rekeys: Rekeys, blocks: Mapping[str, Sequence[str]], world_plugins: Sequence[str]) -> None:
@@ -104,7 +104,7 @@ def check_targets(rekeys: Rekeys, blocks: Mapping[str, Sequence[str]], world_plu
         MissionError: There is no such block or plugin.
     """
     for _, _, *texts in rekeys:
-        for owner, number, plugin, _ in map(Target.parse, texts):
+        for owner, number, plugin, _ in map(RekeyTarget.parse, texts):
             known: Sequence[str] = [*blocks, *world_plugins]
             wrong = owner
             if owner in blocks:

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from xml.etree import ElementTree as ET
 
 from tussle.batch.statistics import scipy_package
-from tussle.stress.study import Probability, Sample
+from tussle.stress.estimates import Probability, Sample
+from tussle.stress.importance import ImportanceEstimate
 
 CONFIDENCE = 0.95
 
@@ -17,8 +18,8 @@ class Assurance:
     """The probability above which a specification holds, with 95 % confidence.
 
     Attributes:
-        least: Lower end of the one-sided interval: exact (Clopper and Pearson 1934) for plain games; for splitting the upper end of the
-            two-sided interval of the failures, which is more careful.
+        least: Lower end of the one-sided interval: exact (Clopper and Pearson 1934) for plain games; for splitting and importance sampling
+            the upper end of the two-sided interval of the failures, which is more careful.
         n_games: Games from which it follows.
         n_failed: Different failing games among them.
     """
@@ -28,9 +29,9 @@ class Assurance:
     n_failed: int
 
     @classmethod
-    def of(cls, found: Sample | Probability) -> Assurance:
-        """The assurance of plain games, or of an estimate by splitting."""
-        if isinstance(found, Probability):
+    def of(cls, found: Sample | Probability | ImportanceEstimate) -> Assurance:
+        """The assurance of plain games, or of an estimate by splitting or importance sampling."""
+        if not isinstance(found, Sample):
             return cls(1.0 - found.high, found.n_games, len(found.failures))
         n, k = len(found.games), len(found.failures)
         most = 1.0 if k == n else float(scipy_package().stats.beta.ppf(CONFIDENCE, k + 1, n - k))

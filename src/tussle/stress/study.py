@@ -8,7 +8,7 @@ import math
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import nullcontext
-from dataclasses import dataclass, field
+from dataclasses import asdict
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -27,17 +27,19 @@ from tussle.engine.simulation import Simulation
 from tussle.errors import BatchError, ParameterError, TussleError
 from tussle.mission import Mission, to_xml
 from tussle.mission.effects import exactly
-from tussle.numeric import total
 from tussle.record.run_file import versions
 from tussle.stress.chances import Chance, chances
 from tussle.stress.changes import changed
+from tussle.stress.distributions import Distribution, with_distributions
+from tussle.stress.estimates import Probability, Sample, worst_first
 from tussle.stress.games import GamePlayer, Ledger, Played, StressGame
+from tussle.stress.importance import ImportanceEstimate, entry, estimate
 from tussle.stress.monitor import Watching
 from tussle.stress.results import write_result, write_why
-from tussle.stress.search import FailureSearch, search, searcher
+from tussle.stress.search import FailureSearch, label, search, searcher
 from tussle.stress.shrink import MAX_SHRINK_GAMES, SmallestGame, shrink
 from tussle.stress.specification import Function, Specification, columns_of
-from tussle.stress.splitting import Repetition, interval, split
+from tussle.stress.splitting import interval, split
 from tussle.stress.why import Explanation, Why
 
 MANY = 0.5
@@ -45,75 +47,6 @@ MANY = 0.5
 MIN_ANCESTORS = 5
 MAX_MADE = 4096
 """Missions of games with values that are kept."""
-
-
-@dataclass
-class Sample:
-    """Plain games of a mission.
-
-    Attributes:
-        games: How they went.
-        low: Lower end of Wilson's 95 % interval of the probability of failure.
-        high: Its upper end.
-    """
-
-    games: list[Played]
-    low: float
-    high: float
-
-    @property
-    def failures(self) -> list[Played]:
-        """Games that failed, the worst first."""
-        return worst_first(p for p in self.games if p.verdict.has_failed)
-
-    @property
-    def value(self) -> float:
-        """Part of the games that failed."""
-        return len(self.failures) / len(self.games)
-
-    @property
-    def robustness(self) -> np.ndarray:
-        """Robustness of each game, (n,)."""
-        return np.array([p.verdict.robustness for p in self.games])
-
-
-@dataclass
-class Probability:
-    """The probability that a game fails, by adaptive multilevel splitting.
-
-    Attributes:
-        value: The estimate, whose mean is the probability.
-        low: Lower end of its 95 % interval, from independent repetitions.
-        high: Its upper end.
-        repetitions: The repetitions.
-        n: Games at a time, of each repetition.
-        game_s: Length of all games that were played [s].
-        cpu_s: Their CPU time [s].
-        failures: Different failing games, the worst first.
-        notes: What to know about the result.
-    """
-
-    value: float
-    low: float
-    high: float
-    repetitions: list[Repetition]
-    n: int
-    game_s: float
-    cpu_s: float
-    failures: list[Played]
-    notes: list[str] = field(default_factory=list)
-
-    @property
-    def n_games(self) -> int:
-        """Games of all repetitions, branches included."""
-        return int(np.sum([r.n_games for r in self.repetitions]))
-
-    @property
-    def n_plain(self) -> float:
-        """Games that an estimate without splitting needs for the same relative standard error; NaN where that is not known."""
-        estimates = np.array([r.probability for r in self.repetitions])
-        variance = float(total((estimates - self.value) ** 2)) / max(len(estimates) - 1, 1) / len(estimates)
-        return self.value * (1.0 - self.value) / variance if variance > 0.0 else float("nan")
 
 
 class Stress:
@@ -129,7 +62,7 @@ class Stress:
         plugin_files: Python files whose plugins the mission file may name.
         ends_by_time: The game ends at its end time whatever the mission says.
         run_timeout: Wall time that a game may take [s], as for `Batch`.
-        vary: What `search` varies, as for `Batch`.
+        vary: What `search` varies, as for `Batch`; or distributions for `importance`, as "normal(10, 2)".
         against: Another mission, or values by name: a game fails only if the same game of that mission, with the same seed, does not.
             For `search` only.
         options: Further options of `read_mission`.
@@ -150,7 +83,7 @@ class Stress:
         plugin_files: Sequence[str | Path] = (),
         ends_by_time: bool = False,
         run_timeout: float | None = None,
-        vary: Mapping[str, Any] | Iterable[str | Variable] = (),
+        vary: Mapping[str, Any] | Iterable[str | Variable | Distribution] = (),
         against: str | Path | Mission | Mapping[str, Any] | None = None,
         **options: Any,
     ) -> None:
@@ -170,8 +103,9 @@ class Stress:
             for source, values in sources
         )  # fmt: skip
         self.others = tuple(others)
-        self.variables = tuple(as_variables(vary))
-        for variable in self.variables:
+        self.distributions, others_vary = with_distributions(vary)
+        self.variables = tuple(as_variables(others_vary))
+        for variable in (*self.variables, *self.distributions):
             if variable.name in given:
                 raise ParameterError(f"{variable.name} is set and varies; say one of the two")
         if isinstance(mission, (str, Path)):
@@ -204,6 +138,8 @@ class Stress:
         }
         if self.variables:
             contents["variables"] = list(map(variable_entry, self.variables))
+        if self.distributions:
+            contents["distributions"] = list(map(asdict, self.distributions))
         if self.others:
             contents["against"] = [self.others[0].info()["mission"], self.others[0].fingerprint]
         text = json.dumps([contents, self.batch.fingerprint, code], default=str)
@@ -287,6 +223,8 @@ class Stress:
         check_argument("games", games, Whole(1, 10**6))
         check_argument("per_round", per_round, Whole(4, 10**4))
         check_argument("sample_seed", sample_seed, Whole(0, 2**32 - 1))
+        if self.distributions:
+            raise ParameterError("a search takes ranges, as 20:30; distributions are for `importance`")
         if not self.variables and not self.others:
             raise ParameterError(
                 "nothing varies, so there is nothing to search; vary a value, or use `probability`"
@@ -329,10 +267,11 @@ class Stress:
         Raises:
             MissionError: A value has no effect.
         """
-        if not isinstance(self.batch.source, (str, Path)) or not self.variables:
+        if not isinstance(self.batch.source, (str, Path)) or not (self.variables or self.distributions):
             return
         points = [
             settings_of({v.name: v.value_at(share) for v in self.variables}, self.variables)
+            | self._settings([2.0 * share - 1.0] * len(self.distributions))
             for share in (0.5, 0.0, 1.0)
         ]
         playable = [point for point in points if not self._refusal(point)]
@@ -340,9 +279,9 @@ class Stress:
             check_variables(self.batch.source, self.batch.settings, playable, **self.batch.reading)
 
     def _check_plain(self, name: str) -> None:
-        if self.variables or self.others:
+        if self.variables or self.others or self.distributions:
             raise ParameterError(
-                f"{name} plays one mission with one set of values; to vary or compare, use `search`"
+                f"{name} plays one mission with one set of values; to vary or compare, use `search`, or `importance` for distributions"
             )
 
     def probability(
@@ -391,6 +330,81 @@ class Stress:
                 },
             )  # fmt: skip
         return result
+
+    def importance(
+        self, games: int = 1000, per_round: int = 400, directory: str | Path | None = None, **how: Any
+    ) -> ImportanceEstimate:
+        """Estimate the probability that a game fails by importance sampling of values with distributions.
+
+        Args:
+            games: Of the last sample, from which the estimate follows.
+            per_round: Games of each round before, which seek where failures are.
+            directory: Where games are kept, and from where the same study goes on; None keeps them in memory.
+            how: `executor`, `processes`, `stack` and `on_game`, as for `GamePlayer`.
+
+        Raises:
+            BatchError: A game has failed with an error, or the directory holds another study.
+            ParameterError: A value has no distribution, the mission cannot be played with a value, all games fail or none, or a number is
+                not allowed.
+        """
+        check_argument("games", games, Whole(10, 10**9))
+        check_argument("per_round", per_round, Whole(50, 10**6))
+        self._check_distributions()
+        with self._ledger(directory) as ledger:
+            player = self._player(ledger, how)
+            last: list[Played] = []
+
+            def robustness_of(u: np.ndarray, first: int) -> np.ndarray:
+                values = [tuple(self._settings(row).items()) for row in u.tolist()]
+                self._make(values)
+                seeds = [(self.first_seed + first + i) % 2**64 for i in range(len(u))]
+                games = [StressGame(seed, (), each) for seed, each in zip(seeds, values, strict=True)]
+                last[:] = player.play(games)
+                return np.array([p.verdict.robustness for p in last])
+
+            found = estimate(robustness_of, len(self.distributions), games, per_round, self.first_seed)
+            found.game_s, found.cpu_s = player.game_s, player.cpu_s
+            found.failures = worst_first(p for p in last if p.verdict.has_failed)
+            self._write(ledger, found.failures, entry(found))
+        return found
+
+    def _check_distributions(self) -> None:
+        """Check that values vary by distributions, and by nothing else."""
+        if self.others:
+            raise ParameterError("importance sampling is of one mission; to compare two, use `search`")
+        for variable in self.variables:
+            raise ParameterError(
+                f"{variable.name} varies without a distribution; write {variable.name}=normal(10, 2), lognormal(10, 0.2) or uniform(5, 15)"
+            )
+        if not self.distributions:
+            raise ParameterError(
+                "nothing varies; vary values with distributions, as prey.Boids.max_speed=normal(10, 2)"
+            )
+        self.check()
+        self._check_effects()
+
+    def _make(self, values: Sequence[tuple[tuple[str, Any], ...]]) -> None:
+        """Make the missions of games with values together, which is faster than one by one.
+
+        Raises:
+            ParameterError: One cannot be played.
+        """
+        try:
+            missions = self.batch.missions_at([dict(each) for each in values])
+        except TussleError:
+            for each in values:
+                if error := self._refusal(dict(each)):
+                    raise ParameterError(
+                        f"with {label(dict(each))} the mission cannot be played: {error}; choose a distribution without such values"
+                    ) from None
+            raise
+        self._made = {
+            StressGame(0, (), each): mission for each, mission in zip(values, missions, strict=True)
+        }
+
+    def _settings(self, u: Sequence[float]) -> dict[str, Any]:
+        """Settings at standard normal numbers."""
+        return {d.name: d.setting(d.value_at(x)) for d, x in zip(self.distributions, u, strict=True)}
 
     def chances(
         self,
@@ -546,13 +560,3 @@ class _Random:
             )
         self._is_first = False
         return played
-
-
-def worst_first(games: Any) -> list[Played]:
-    """Different games, the worst first: of those that branched from one game only the worst."""
-    best: dict[tuple[Any, int], Played] = {}
-    for played in games:
-        key = played.game.values, played.game.seed
-        if key not in best or played.verdict.robustness < best[key].verdict.robustness:
-            best[key] = played
-    return sorted(best.values(), key=lambda p: p.verdict.robustness)

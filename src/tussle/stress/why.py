@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -10,9 +11,9 @@ import numpy as np
 
 from tussle.batch.statistics import wilson
 from tussle.engine.simulation import Simulation
-from tussle.errors import TussleError
+from tussle.errors import BatchError, TussleError
 from tussle.mission import Mission
-from tussle.mission.rekeys import Target
+from tussle.mission.rekeys import RekeyTarget
 from tussle.numeric.rng import stream_key
 from tussle.stress.chances import Chance, chances
 from tussle.stress.changes import Change, removable
@@ -195,7 +196,7 @@ class Explanation:
 
     # -- other luck of some -----------------------------------------------------------------------------------------------------------
 
-    def _luck(self, opened: int | None, draws: Sequence[Target]) -> list[Counterfactual]:
+    def _luck(self, opened: int | None, draws: Sequence[RekeyTarget]) -> list[Counterfactual]:
         """Other luck of blocks and of the entities of those that matter, from the beginning and the last open moment; of streams."""
         steps = sorted({0, opened or 0})
         blocks = self._mission.blocks
@@ -203,10 +204,13 @@ class Explanation:
         by_id = any(
             target.owner not in [b.name for b in blocks] for target in draws
         )  # keyed by entities, perhaps
-        of_blocks = self._redrawn([Target(b.name) for b in blocks if by_id or b.name in drawing], steps)
+        of_blocks = self._redrawn([RekeyTarget(b.name) for b in blocks if by_id or b.name in drawing], steps)
         matters = {row.name for row in of_blocks if row.n_failed < row.n}
         who = [
-            Target(b.name, i + 1) for b in blocks if b.count > 1 and b.name in matters for i in range(b.count)
+            RekeyTarget(b.name, i + 1)
+            for b in blocks
+            if b.count > 1 and b.name in matters
+            for i in range(b.count)
         ]
         return [
             *of_blocks,
@@ -214,7 +218,7 @@ class Explanation:
             *self._redrawn(draws[:MAX_STREAMS], steps[-1:]),
         ]
 
-    def _traced(self) -> tuple[list[Target], set[str]]:
+    def _traced(self) -> tuple[list[RekeyTarget], set[str]]:
         """The random streams that the game draws from, by block and world plugin, and the networks on which somebody listens."""
         game = self._failed.game
         with Simulation(self._made(game).replace(rekeys=game.rekeys), game.seed) as sim:
@@ -223,16 +227,16 @@ class Explanation:
             networks = {topic.network for topic in sim.state.message_bus.topics.values() if topic.inboxes}
         of_blocks, of_world = self._mission.draws
         found = [
-            Target(block, 0, plugin, label)
+            RekeyTarget(block, 0, plugin, label)
             for plugin, label in drawn
             for block in of_blocks
             if plugin in of_blocks[block]
         ]
         return found + [
-            Target(plugin, 0, "", label) for plugin, label in drawn if plugin in of_world
+            RekeyTarget(plugin, 0, "", label) for plugin, label in drawn if plugin in of_world
         ], networks
 
-    def _redrawn(self, targets: Iterable[Target], steps: Sequence[int]) -> list[Counterfactual]:
+    def _redrawn(self, targets: Iterable[RekeyTarget], steps: Sequence[int]) -> list[Counterfactual]:
         game = self._failed.game
         asked = [
             (
@@ -277,7 +281,14 @@ class Explanation:
             keys = [stream_key("stress", "without", f"{game.name} {lost} {i}") for i in range(self._n - 1)]
             kind = "messages" if change[0].startswith("reach") else change[0]
             asked.append(((kind, _label(change), lost), [game, *(game.branch(lost, key) for key in keys)]))
-        return self._rows(asked)
+        try:
+            return self._rows(asked)
+        except BatchError:  # with other luck, a game without something may fail with an error
+            rows: list[Counterfactual] = []
+            for each in asked:
+                with suppress(BatchError):
+                    rows += self._rows([each])
+            return rows
 
     def _is_playable(self, game: StressGame) -> bool:
         try:
@@ -300,5 +311,5 @@ class Explanation:
 def _label(change: Change) -> str:
     kind, name, *number = change
     if kind == "entity":
-        return str(Target(name, int(number[0])))
+        return str(RekeyTarget(name, int(number[0])))
     return name if kind == "plugin" else f"{name} {kind}"

@@ -120,3 +120,51 @@ def test_a_search_for_values_that_fail(tussle, folder):
         "other",
     )
     assert "the same game of the other mission does not" in " ".join(compared.stdout.split())
+
+
+RARE = (
+    *("stress", EXAMPLE / "pair.xml", "--spec", "always (distance(left, right) > 1 m)", "--processes", "1"),
+    *("--probability", "--importance", "--vary", "right_x=normal(14, 1)", "-n", "60", "--out", "out"),
+)
+
+
+def test_importance_sampling_of_a_start_position(tussle, folder):
+    """The distance at the end is 6 m less than a normal number: it fails beyond 5 standard deviations."""
+    done = tussle(*RARE, "--why", "--holds", "0.99")
+    text = " ".join(done.stdout.split())
+    assert re.search(r"probability of failure \S+e-07 \(\S+\)", text)
+    assert re.search(r"effective failing games of \d+; the greatest weight is \d+\.\d% of all", text)
+    assert re.search(r"failures/0.xml: right_x=\d", text)
+    assert "undone by nothing that was tried" in text
+    assert "holds with 95 % confidence above 0.99" in text
+    assert "cannot be trusted" in " ".join(done.stderr.split())
+    result = json.loads((folder / "out/result.json").read_text())
+    assert result["low"] < 2.87e-7 < result["high"]
+    played = tussle("run", folder / "out/failures/0.xml")
+    assert result["failures"][0]["state_hash"] in played.stdout
+
+
+@pytest.mark.parametrize(
+    ("changes", "message", "code"),
+    [
+        (("--vary", "left_x=0:1"), "left_x varies without a distribution", 1),
+        (("--vary", "left_x=gauss(0, 1)"), "there is no distribution 'gauss'", 1),
+        (
+            ("--vary", "left_x=normal(30, 1)", "--spec", "always (distance(left, right) > 50 m)"),
+            "all of 400 games fail",
+            1,
+        ),
+        (("--against", "left_x=3"), "it does not compare missions", 2),
+    ],
+)
+def test_importance_sampling_that_is_refused(tussle, changes, message, code):
+    done = tussle(*RARE, *changes, code=code)
+    assert message in " ".join(done.stderr.split())
+    assert "Traceback" not in done.stderr
+
+
+def test_importance_sampling_needs_values(tussle):
+    done = tussle(
+        "stress", EXAMPLE / "pair.xml", "--spec", "count(all) > 1", "--probability", "--importance", code=2
+    )
+    assert "--importance needs --probability, and --vary" in " ".join(done.stderr.split())

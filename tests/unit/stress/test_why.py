@@ -112,7 +112,9 @@ def test_a_motor_that_is_stuck_at_a_known_time():
         flight("right", 5.0, -1.0),
         flight("far", 500.0, controller=harmless),
     ]
-    _, why = explained(Mission(blocks=blocks, end=8, dt=0.1), "always (distance(left, right) > 1 m)", 1, branches=20)
+    _, why = explained(
+        Mission(blocks=blocks, end=8, dt=0.1), "always (distance(left, right) > 1 m)", 1, branches=20
+    )
     assert why.causes == ["plugin left.ActuatorFault"]
     assert row(why, "plugin", "far.Harmless").n_failed == 20
     assert (why.open_step, why.lost_step, why.saved, why.saved_step) == (None, 0, None, None)
@@ -199,6 +201,28 @@ def test_losses_of_a_team():
     _, why = explained(mission, "always (count(team 1) > 3.5)", 1, branches=20)
     assert why.causes == ["plugin RandomAttrit"]
     assert row(why, "luck", "RandomAttrit///lot").n_failed == 20
+
+
+class Needs(Interaction):
+    """Fails with an error, sometimes, where a block is missing; looks on otherwise."""
+
+    grade = "portable"
+
+    def step(self, w):
+        is_short = np.bincount(w.world, minlength=w.n_worlds) < 5
+        if (is_short & (w.t > 2.5) & (w.uniform("trouble") > 0.99)).any():
+            raise ValueError("an entity is missing")
+
+
+def test_what_ends_with_an_error_has_no_row():
+    mission = gusty().replace(interactions=[Needs()], end=4)
+    study = Stress(mission, GUSTY)
+    played = study.sample(600, processes=1).games
+    early = next(p for p in played if p.verdict.has_failed and p.verdict.first_below(0.0) < 20)
+    why = study.why(early, branches=20, processes=1)
+    assert not [each for each in why.rows if (each.kind, each.name) == ("entity", "crowd")]
+    assert row(why, "plugin", "Needs").n_failed >= 17
+    assert "luck left" in why.causes
 
 
 def test_what_is_not_explained():
