@@ -15,8 +15,10 @@ import numpy as np
 
 from tussle.batch.statistics import SEED, scipy_package
 
-MAX_TUNED = 80
+MAX_TUNED = 200
 """So many points, evenly spaced by number, choose lengths and noise."""
+DIFFERENCE = 1e-4
+"""Difference for the slopes of the evidence, whose rounding is about 1e-8: with one of that size slopes are noise, and the search ends early."""
 JITTER = 1e-8
 N_DRAWS = 200
 MAX_DRAWN = 200
@@ -188,7 +190,7 @@ def tuned_kernel(is_number: Sequence[bool], x: np.ndarray, observed: Observed) -
         return -evidence + 0.5 * float((((theta - middle) / sd) ** 2).sum())
 
     bounds = [(m - 4.0 * s, m + 4.0 * s) for m, s in zip(centre, spread, strict=True)]
-    options = {"maxiter": 30, "ftol": 1e-6}
+    options = {"maxiter": 60, "ftol": 1e-7, "eps": DIFFERENCE}
     found = scipy_package().optimize.minimize(loss, middle, method="L-BFGS-B", bounds=bounds, options=options)
     return _kernel_of(is_number, found.x)
 
