@@ -162,6 +162,10 @@ def test_many_variables_and_points_are_gathered_and_it_is_said():
     scores = {2: np.random.default_rng(5).poisson(mean, (1, 1024)), 3: noise(1024, 1, 15.0)}
     said = texts_of(made_batch(scores, variables=variables, points=points, sample="sobol"))
     assert "6 of 8 variables" in said
+    assert re.search(
+        r"keepers won \d+ of 1,024 games over 1,024 points \([\d.]+ %\), switchers \d+ \([\d.]+ %\)", said
+    )
+    assert "nan" not in said
     assert "Line: smooth fit (Gaussian process), the other variables as at all points." in said
     assert "switchers minus keepers, by x2 and x5" in said  # the map is of the two that matter
     assert "The two strongest of 8 variables that are numbers." in said

@@ -453,13 +453,14 @@ def answer(data: ReportData) -> str:
     winners = sorted((s for s in shares if s.team is not None), key=lambda s: -s.n)
     if not winners:
         return f"All {games} ended in ties." if data.n_good > 1 else "The only game ended in a tie."
-    ends = [f"{100.0 * s.low:.1f} to {100.0 * s.high:.1f}" for s in winners]
-    first = winners[0]
-    parts = [
-        f"{first.name} won {count(first.n)} of {games} ({percent(first.value)}, 95 % interval {ends[0]})"
+    ends = [  # none where all games have one seed
+        f"{100.0 * s.low:.1f} to {100.0 * s.high:.1f}" if math.isfinite(s.low) else "" for s in winners
     ]
+    first = winners[0]
+    known = f", 95 % interval {ends[0]}" if ends[0] else ""
+    parts = [f"{first.name} won {count(first.n)} of {games} ({percent(first.value)}{known})"]
     parts += [
-        f"{s.name} {count(s.n)} ({percent(s.value)}, {e})"
+        f"{s.name} {count(s.n)} ({percent(s.value)}{e and f', {e}'})"
         for s, e in zip(winners[1:3], ends[1:], strict=False)
     ]
     parts += [f"other teams {count(sum(s.n for s in winners[3:]))}"] if winners[3:] else []
