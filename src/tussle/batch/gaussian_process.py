@@ -18,7 +18,7 @@ from tussle.batch.statistics import SEED, scipy_package
 MAX_TUNED = 200
 """So many points, evenly spaced by number, choose lengths and noise."""
 DIFFERENCE = 1e-4
-"""Difference for the slopes of the evidence, whose rounding is about 1e-8: with one of that size slopes are noise, and the search ends early."""
+"""Difference for the slopes of the evidence, which is rounded to about 1e-8: with one of that size, slopes are noise."""
 JITTER = 1e-8
 N_DRAWS = 200
 MAX_DRAWN = 200
