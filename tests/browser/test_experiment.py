@@ -42,7 +42,7 @@ def order(tab, boat, whom, place):
 
 def check_looks(tab, name):
     """The page says who operates, in colours that can be read in the dark and in the light."""
-    assert f"{name}, you operate team 1" in tab.locator("#subtitle").inner_text()
+    wait_until(tab, f"document.querySelector('#subtitle').innerText.includes('{name}, you operate team 1')")
     for _ in ("light", "dark"):
         tab.keyboard.press("k")
         tab.wait_for_timeout(500)

@@ -22,8 +22,9 @@ def test_an_operator_sees_the_game_late_and_gives_orders_to_an_entity_chosen_jus
         Page(live, viewer=UNHURRIED, operators={"Zoë [b]<i>": 1}) as page,
     ):  # fmt: skip
         watched = Watched(chromium, page, url=page.addresses[PageRole("operate", 1, "Zoë [b]<i>")])
-        watched.wait("player.status")
-        assert "Zoë [b]<i>, you operate team 1" in watched.tab.locator("#subtitle").inner_text()
+        watched.wait(
+            "document.querySelector('#subtitle').innerText.includes('Zoë [b]<i>, you operate team 1')"
+        )
         assert not faint_texts(watched.tab, [[255, 255, 255]])
         assert any("what is seen is 2 s old" in note for note in watched.wait("player.status")["notes"])
         live.resume()
