@@ -445,14 +445,17 @@ class GroupView:
 
     # -- random numbers and services ------------------------------------------------------------------------------------------------
 
-    def _differs(self, what: str) -> None:
+    def _differs(self, what: str, label: str = "") -> None:
         """Refuse what differs from step to step where the calls of kernels are recorded."""
         if self.context.later is not None:
-            raise DeclarationError(f"{type(self._caller).__name__} promises only_calls_kernels, but {what}")
+            named = f" {label!r}" if label else ""
+            raise DeclarationError(
+                f"{type(self._caller).__name__} promises only_calls_kernels, but {what}{named}"
+            )
 
     def _draw(self, label: str) -> tuple[str, str]:
         """Plugin and label of a draw, noted as drawn."""
-        self._differs(f"draws {label!r}")
+        self._differs("draws", label)
         draw = self._caller.instance_name if self._caller is not None else "", label
         self.context.streams.add(draw)
         return draw

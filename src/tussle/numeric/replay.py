@@ -22,8 +22,8 @@ class KernelCalls:
 
     Attributes:
         calls: Kernels with their arguments.
-        is_whole: Whether these are all calls, and none returned anything but True: then the same calls can be made again, and
-            a kernel that does not return True again tells that what follows would be another one.
+        is_whole: Whether these are all calls, and each returned nothing or True. Then they can be made again, up to one that does not
+            return True.
     """
 
     def __init__(self) -> None:
@@ -61,10 +61,8 @@ def recording() -> Iterator[KernelCalls]:
     finally:
         for each in kernels:
             each.call_by(None)
-        recorded.is_whole &= before == (
-            len(ready),
-            stats.interpreted,
-        )  # new kernels have not been listened to
+        # New kernels, and those that ran as Python, have not been listened to.
+        recorded.is_whole &= before == (len(ready), stats.interpreted)
         _is_recording.release()
 
 
@@ -99,12 +97,8 @@ class Replay:
         words = np.concatenate([each.words for each in self._bound])
         entries = np.array([each.entry for each in self._bound])
         returns = np.array([bool(call[0].results) for call in calls])
-        self._call = (
-            entries,
-            words.ctypes.data + 8 * starts,
-            np.where(returns, starts + RESULTS, -1),
-            words,
-        )
+        truths = np.where(returns, starts + RESULTS, -1)
+        self._call = entries, words.ctypes.data + 8 * starts, truths, words
         self._run = kernel_of_replays()
 
     def run(self) -> int:

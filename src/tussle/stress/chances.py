@@ -37,6 +37,11 @@ class Chance:
         return self.n_failed / self.n
 
 
+def branches_from(game: StressGame, step: int, n: int) -> list[StressGame]:
+    """Branches that repeat a game up to a step, and then have other luck."""
+    return [game.branch(step, stream_key("stress", "chance", f"{game.name} {step} {i}")) for i in range(n)]
+
+
 def chances(
     play: Callable[[Sequence[StressGame]], Sequence[Played]], failed: Played, moments: int, branches: int
 ) -> list[Chance]:
@@ -57,11 +62,7 @@ def chances(
             f"the game with seed {failed.game.seed} did not fail, so nothing is to be explained"
         )
     steps = sorted({round(step) for step in np.linspace(0, end, moments).tolist()})
-    games = [
-        failed.game.branch(step, stream_key("stress", "chance", f"{failed.game.name} {step} {i}"))
-        for step in steps
-        for i in range(branches)
-    ]
+    games = [branch for step in steps for branch in branches_from(failed.game, step, branches)]
     has_failed = np.array([p.verdict.has_failed for p in play(games)]).reshape(len(steps), branches)
     counts = has_failed.sum(axis=1).tolist()
     return [Chance(step, branches, k, *wilson(k, branches)) for step, k in zip(steps, counts, strict=True)]

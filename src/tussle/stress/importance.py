@@ -251,18 +251,7 @@ def _estimated(
     if not n_failed:  # the first ones are plain games
         high = 1.0 - 0.05 ** (1.0 / max(1, round(SHARES[0] * n)))
         return ImportanceEstimate(
-            0.0,
-            0.0,
-            high,
-            n,
-            n_before + n,
-            0,
-            levels,
-            0.0,
-            0.0,
-            means,
-            0.0,
-            notes=["no game of the last sample failed"],
+            0.0, 0.0, high, n, n_before + n, 0, levels, 0.0, 0.0, means, 0.0, notes=[NOTHING]
         )
     whole, squares = float(total(weights)), float(total(weights * weights))
     value, effective, greatest = whole / n, whole * whole / squares, float(weights.max()) / whole

@@ -15,7 +15,7 @@ from tussle.errors import BatchError, TussleError
 from tussle.mission import Mission
 from tussle.mission.rekeys import RekeyTarget
 from tussle.numeric.rng import stream_key
-from tussle.stress.chances import Chance, chances
+from tussle.stress.chances import Chance, branches_from, chances
 from tussle.stress.changes import Change, removable
 from tussle.stress.games import Played, StressGame
 from tussle.stress.monitor import Watching
@@ -34,7 +34,7 @@ MAX_STREAMS = 48
 
 
 @dataclass(frozen=True)
-class Counterfactual:
+class Counterfactual(Chance):
     """Games in which one thing is other than in a failing game.
 
     Attributes:
@@ -42,25 +42,10 @@ class Counterfactual:
             entity is not there; "plugin": a fault does not happen, or a plugin is left out; "messages": those of a network reach all, or
             none. These three hold from the beginning of the game, which has the same draws up to `step` and then other ones.
         name: What is other.
-        step: The start of this step.
-        n: Games.
-        n_failed: Those that still failed.
-        low: Lower end of Wilson's 95 % interval of the probability that they fail.
-        high: Its upper end.
     """
 
     kind: str
     name: str
-    step: int
-    n: int
-    n_failed: int
-    low: float
-    high: float
-
-    @property
-    def value(self) -> float:
-        """Part of the games that still fail."""
-        return self.n_failed / self.n
 
     @property
     def undoes(self) -> bool:
@@ -167,13 +152,7 @@ class Explanation:
     def _branches(self, step: int) -> list[Played]:
         """Branches from a moment with other luck of all, the same as of `chances`."""
         if step not in self._from:
-            games = (
-                self._failed.game.branch(
-                    step, stream_key("stress", "chance", f"{self._failed.game.name} {step} {i}")
-                )
-                for i in range(self._n)
-            )
-            self._from[step] = self._play(list(games))
+            self._from[step] = self._play(branches_from(self._failed.game, step, self._n))
         return self._from[step]
 
     def _last(self, steps: Sequence[int], is_so: Callable[[int], bool]) -> int | None:
@@ -303,8 +282,8 @@ class Explanation:
             np.array([p.verdict.has_failed for p in played], bool).reshape(-1, self._n).sum(axis=1).tolist()
         )
         return [
-            Counterfactual(*what, self._n, k, *wilson(k, self._n))
-            for (what, _), k in zip(asked, counts, strict=True)
+            Counterfactual(step, self._n, k, *wilson(k, self._n), kind, name)
+            for ((kind, name, step), _), k in zip(asked, counts, strict=True)
         ]
 
 
