@@ -27,7 +27,7 @@ import numpy as np
 
 from tussle import Mission, Simulation
 from tussle.mission.spec import SHUFFLED, UPDATES
-from tussle.stock import Boids, SimpleCapture, SimpleCollision
+from tussle.stock import Boids, Predator, SimpleCapture, SimpleCollision
 
 Z_99 = 2.5758
 """Two-sided 1 % point of the normal distribution."""
@@ -52,10 +52,14 @@ def mission(update: str, law: str) -> Mission:
         return mission_2025()
     averaging = "historic" if law == "historic" else "team"
     base = game.mission(motion_multiplier=1)
-    prey, *predators = base.blocks
-    boids = Boids(averaging=averaging, goal_distance=GOAL_AHEAD)
-    blocks = [type(prey)(**{**vars(prey), "autonomy": boids}), *predators]
-    return base.replace(blocks=blocks, update=update, interactions=[SimpleCapture(credit="each")])
+    minds = [Boids(averaging=averaging, goal_distance=GOAL_AHEAD)]
+    minds += [
+        Predator(max_speed=35.0, allow_prey_switching=switches, between_steps=False)
+        for switches in (False, True)
+    ]
+    blocks = [block.replace(autonomy=mind) for block, mind in zip(base.blocks, minds, strict=True)]
+    rules = [SimpleCapture(credit="each", between_steps=False)]
+    return base.replace(blocks=blocks, update=update, interactions=rules)
 
 
 def play(job: tuple[str, str, list[int]]) -> list[tuple[int, int, int, int, float]]:

@@ -69,13 +69,14 @@ def test_a_claim_holds_up_to_the_range_included(distance, is_caught):
     assert alive(sim) is not is_caught
 
 
-def test_it_is_judged_in_the_same_step_after_all_have_moved():
+def test_it_is_judged_in_the_same_step_by_the_least_distance_of_the_ways_or_at_their_end():
     sim = Simulation(hunt((4.0, 2, {"first": 0})))
     sim.step()
     assert not alive(sim)
-    # 4.9 m before the step, but 0.2 s * 10 m/s further on after it: out of reach.
-    fled = hunt((4.9, 2, {"first": 0}), speed=20.0)
-    assert alive(judged(fled))
+    # 4.9 m before the step, but 0.1 s * 20 m/s further on after it: out of reach at its end.
+    fled = {"speed": 20.0}
+    assert not alive(judged(hunt((4.9, 2, {"first": 0}), **fled)))
+    assert alive(judged(hunt((4.9, 2, {"first": 0}), **fled, between_steps=False)))
 
 
 def test_a_claim_that_failed_can_be_made_again():

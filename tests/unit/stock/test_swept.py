@@ -183,3 +183,64 @@ def test_a_defender_captures_an_intruder_that_passes_it_within_a_step():
         sim = flock([[52, 3, 0], [-8, 0, 0]], [[0, 0, 0], [400, 0, 0]], [region, guard])
         sim.step(5)
         assert living(sim) == [left]
+
+
+def claimed(pos, vel, hunter, n_steps=1, referee=stock.SimpleCapture, **given):
+    """Ids that are left after `n_steps`, by world, where entities of team 1 fly straight, and the last one, of team 2, is a hunter."""
+    blocks = [
+        Block(
+            name=f"a{i}", team=1 + (i == len(pos) - 1), position=tuple(p), variance=(0, 0, 0),
+            motion=stock.SingleIntegrator(max_speed=-1.0), autonomy=(Fly(), hunter) if i == len(pos) - 1 else Fly(),
+        )
+        for i, p in enumerate(pos)
+    ]  # fmt: skip
+    networks = [stock.GlobalNetwork(), stock.LocalNetwork()]
+    made = Mission(
+        blocks=blocks, dt=0.1, end=100.0, networks=networks, interactions=[referee(capture_range=5.0)]
+    )
+    sim = Simulation(made, **{"seeds": 1, **given})
+    for i, v in enumerate(vel):
+        sim.write(f"a{i}.Fly.velocity", v)
+    sim.step(1)  # the autonomies see the velocities from the second step on
+    sim.step(n_steps)
+    return living(sim)
+
+
+def hunter(laws, **values):
+    return laws.Predator(pursue=False, prey_team_id=1, capture_range=5.0, **values)
+
+
+@given(st.integers(0, 10_000), st.sampled_from([0.0, 20.0, 200.0, 2000.0]))
+def test_a_predator_captures_whom_it_passes_within_range(seed, speed):
+    chance = np.random.default_rng(seed)
+    pos, vel = chance.uniform(-40, 40, (20, 3)), chance.normal(0, speed, (20, 3))
+    vel[::3] *= 0.01
+    pos[-1], vel[-1] = 0.0, vel[-1] * chance.choice([0.0, 1.0, 3.0])
+    for n_steps in (1, 2):
+        least = np.inf * np.ones(20)
+        for step in range(n_steps):
+            least = np.minimum(least, least_distances(pos + (1 + step) * 0.1 * vel, vel)[-1])
+        worlds = [
+            left
+            for given in ({}, {"seeds": [1, 2], "threads": 2})
+            for left in claimed(pos, vel, hunter(stock), n_steps, **given)
+        ]
+        first = (
+            np.linalg.norm(pos - pos[-1], axis=1)[:-1] < 6.0 + 0.3 * speed
+        )  # may be captured in the step before
+        for left in worlds:
+            assert left == worlds[0]
+            assert {k + 1 for k in np.flatnonzero((least[:-1] >= 5.0) & ~first)} <= left
+            assert not left & {k + 1 for k in np.flatnonzero(least[:-1] < 4.99)}
+
+
+def test_a_fast_prey_that_passes_a_predator_is_captured_unless_by_the_law_of_scrimmage():
+    pos, vel = [[-45, 3, 0], [0, 0, 0]], [[300, 0, 0], [0, 0, 0]]
+    assert claimed(pos, vel, hunter(stock)) == [{2}]
+    assert claimed(pos, vel, hunter(stock, between_steps=False)) == [{1, 2}]
+    assert claimed(pos, vel, hunter(historic), referee=historic.SimpleCapture, n_steps=2) == [{1, 2}]
+    assert claimed(
+        pos, vel, stock.Escort(capture_range=5.0, intruder_team=1, network_name="GlobalNetwork")
+    ) == [{2}]
+    assert claimed([[-45, 6, 0], [0, 0, 0]], vel, hunter(stock)) == [{1, 2}]
+    assert claimed(pos, [[300, 0, 0], [300, 0, 0]], hunter(stock)) == [{1, 2}]

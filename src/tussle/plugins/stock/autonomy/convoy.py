@@ -6,6 +6,7 @@ import numpy as np
 
 from tussle.api import Autonomy, EntityRef, Field, GroupView, Message, Param, Publish, Subscribe, unit
 from tussle.declare.messages import CaptureEntity, Waypoint
+from tussle.numeric.ways import closest_approach
 
 
 class ConvoyReport(Message):
@@ -71,7 +72,8 @@ class Escort(Autonomy):
     """Guards a convoy: flies to the nearest intruder that is reported or seen, otherwise to the middle of the convoy.
 
     It publishes the goal as a `Waypoint` for a `GoTo` after it. The middle is the mean of the positions that are reported in a step. It
-    claims intruders within `capture_range`; `SimpleCapture` decides the claims. Without reports it keeps its goal.
+    claims the nearest intruder if it is within `capture_range`, or comes there during the step; `SimpleCapture` decides the claims.
+    Without reports it keeps its goal.
     """
 
     grade = "portable"
@@ -102,5 +104,8 @@ class Escort(Autonomy):
         rows, others = seen(g, self.intruder_team, self.sight)
         goal[:, rows], has_goal[rows] = g.bodies.pos[:, others], True
         self.goals.publish(np.flatnonzero(has_goal), pos=goal[:, has_goal])
-        rows, others = seen(g, self.intruder_team, self.capture_range)
-        self.captures.publish(rows, target=g.bodies.id[others])
+        nearest = g.nearest(teams=self.intruder_team)
+        others = nearest.other[0]
+        _, least = closest_approach(nearest.offset[:, 0], g.dt * (g.bodies.vel[:, others] - g.vel))
+        rows = np.flatnonzero((others >= 0) & (least <= self.capture_range))
+        self.captures.publish(rows, target=g.bodies.id[others[rows]])

@@ -6,10 +6,14 @@ import numpy as np
 
 from tussle.api import Interaction, Param, WorldView
 from tussle.declare.messages import CaptureEntity, EntityCaptured, Messages
+from tussle.numeric.ways import closest_approach
 
 
 class SimpleCapture(Interaction):
     """Decides capture claims (`CaptureEntity`) at the end of the step in which they are made. A claim is valid within `capture_range`.
+
+    The distance of a claim is the least one on the straight ways of both entities in the step, so that a fast prey can be claimed before
+    it passes. With `between_steps="false"` it is that at the end of the step, as in the code of the 2018 paper.
 
     By default each capture is credited once, to the nearest claimant (on ties the smaller id). With `credit="each"` every valid claim
     counts, as in the code of the 2018 paper: a prey claimed by k predators in one step scores k. SCRIMMAGE decided one step
@@ -17,8 +21,10 @@ class SimpleCapture(Interaction):
     """
 
     grade = "portable"
+    reads_start_positions = True
 
     capture_range = Param(5.0, unit="m", ge=0.0, doc="Largest distance of a valid claim.")
+    between_steps = Param(True, doc="Measure on the ways of the step; otherwise at its end.")
     enable_team_captures = Param(True, doc="Allow captures of team mates.")
     enable_non_team_captures = Param(True, doc="Allow captures of entities of other teams.")
     credit = Param("once", choices=("once", "each"), doc="Count a capture once, or once per valid claim.")
@@ -46,8 +52,8 @@ class SimpleCapture(Interaction):
         source, target = w.rows_at(claims.world, claims.sender), w.rows_at(claims.world, claims.target)
         is_there = (source >= 0) & (target >= 0)
         source, target, world = source[is_there], target[is_there], claims.world[is_there]
-        dx, dy, dz = w.pos[:, target] - w.pos[:, source]
-        distance = np.sqrt(dx * dx + dy * dy + dz * dz)
+        end, begin = (pos[:, target] - pos[:, source] for pos in (w.pos, w.start_pos))
+        _, distance = closest_approach(end, self.between_steps[world] * (begin - end))
         is_team = w.team[source] == w.team[target]
         allowed = np.where(is_team, self.enable_team_captures[world], self.enable_non_team_captures[world])
         valid = np.flatnonzero((distance <= self.capture_range[world]) & allowed)

@@ -10,20 +10,27 @@ from tussle.numeric import atan2, wrap
 from tussle.numeric.kernel import kernel
 from tussle.numeric.neighbors.search import DIFFERENT, SAME, TABLE, in_range, nearest_places, table_of
 
+FAR = 1e150
+"""Speed that does not count [m/s]: its square would overflow."""
 
-@kernel(f"(F F F F) (I I) B (Iw Iw Iw Iw Iw) (I I I I) i8 {TABLE} -> b1")
-def hunt(points, teams, allow_switching, out, rows, first, arrays):
+
+@kernel(f"(F F F F) F2 f8 (I I) (B B) (Iw Iw Iw Iw Iw) (I I I I) i8 {TABLE} -> b1")
+def hunt(points, vel, dt, teams, options, out, rows, first, arrays):
     """Choose targets and collect claims for the rows of a group that begins at row `first` of the table.
 
     A target is kept while it lives and switching is not allowed; else the nearest entity of prey_team is chosen (on ties the
-    smaller id). Every entity of another team nearer than capture_range is claimed.
+    smaller id). Every entity of another team nearer than capture_range is claimed, and with between_steps those that come nearer within
+    `dt`, if both move straight on.
 
     Args:
         points: x, y, z and capture_range [m], (n,) each, by row of the group.
+        vel: Velocities of the body table [m/s], (3, N).
+        dt: Duration of the step [s].
         teams: Own team and prey_team, (n,).
-        allow_switching: Whether the nearest prey is chosen in every step, (n,).
+        options: allow_switching, whether the nearest prey is chosen in every step, and between_steps, (n,).
         out: target, the id of the prey or 0, (n,); target_row, its row of the body table or -1, (n,); claim_row, row of the group,
-            and claim_place, row of the body table, per claim, as many as fit; count, their number, (1,); written.
+            and claim_place, row of the body table, per claim, as many as fit; count, their number, or more if they do not fit, (1,);
+            written.
         rows: id, world and place of each row of the body table; row of each place.
         first: First row of the group in the body table.
         arrays: Neighbour index, and team of each place.
@@ -33,9 +40,16 @@ def hunt(points, teams, allow_switching, out, rows, first, arrays):
     """
     x, y, z, capture_range = points
     own_team, prey_team = teams
+    allow_switching, between_steps = options
     target, target_row, claim_row, claim_place, count = out
     row_id, row_world, place, order = rows
     table = table_of(arrays)
+    table_x, table_y, table_z = table[5], table[6], table[7]
+    fastest = np.zeros(table[0].shape[0])
+    for j in range(row_world.shape[0]):
+        speed = math.sqrt(vel[0, j] * vel[0, j] + vel[1, j] * vel[1, j] + vel[2, j] * vel[2, j])
+        if fastest[row_world[j]] < speed < FAR:
+            fastest[row_world[j]] = speed
     best, ranks, places = np.empty(1), np.empty(1, np.int64), np.empty(1, np.int64)
     n_claims = np.int64(
         0
@@ -57,17 +71,36 @@ def hunt(points, teams, allow_switching, out, rows, first, arrays):
             x[i],
             y[i],
             z[i],
-            capture_range[i],
+            capture_range[i] + (2.0 + 1e-9) * dt * fastest[w] if between_steps[i] else capture_range[i],
             DIFFERENT,
             float(own_team[i]),
             table,
             claim_place,
             n_claims,
         )
-        for k in range(n_claims, min(until, room)):
-            claim_row[k] = i
-            claim_place[k] = order[claim_place[k]]
-        n_claims = until
+        if until > room:
+            n_claims = until
+            continue
+        for k in range(n_claims, until):
+            p = claim_place[k]
+            j = order[p]
+            dx, dy, dz = table_x[p] - x[i], table_y[p] - y[i], table_z[p] - z[i]
+            if not math.sqrt(dx * dx + dy * dy + dz * dz) < capture_range[i]:
+                u, v, s = (
+                    dt * (vel[0, j] - vel[0, row]),
+                    dt * (vel[1, j] - vel[1, row]),
+                    dt * (vel[2, j] - vel[2, row]),
+                )
+                square = u * u + v * v + s * s
+                part = min(-(dx * u + dy * v + dz * s) / square, 1.0) if 0.0 < square < FAR * FAR else 0.0
+                if not part > 0.0:
+                    continue
+                dx, dy, dz = dx + part * u, dy + part * v, dz + part * s
+                if not math.sqrt(dx * dx + dy * dy + dz * dz) < capture_range[i]:
+                    continue
+            claim_row[n_claims] = i
+            claim_place[n_claims] = j
+            n_claims += 1
     count[0] = n_claims
     return n_claims <= room
 

@@ -12,6 +12,7 @@ from tussle.plugins.stock.autonomy.predator import kernels
 class Predator(Autonomy):
     """Pursues the nearest prey (pure pursuit) and claims every entity of another team within `capture_range`.
 
+    It also claims those that come within that range during the step, if both move straight on: fast ones would pass each other unseen.
     Without `allow_prey_switching` a target is kept until it is removed. Claims include rival predators, as in the paper's code.
     When no prey is left, the last commands persist. Without `pursue` it only claims, and another autonomy of the entity flies.
     """
@@ -23,6 +24,7 @@ class Predator(Autonomy):
     capture_range = Param(
         5.0, unit="m", ge=0.0, doc="Distance below which entities of other teams are claimed."
     )
+    between_steps = Param(True, doc="Claim entities, too, that come within capture_range during the step.")
     allow_prey_switching = Param(True, doc="Choose the nearest prey in every step.")
     prey_team_id = Param(1, doc="Team that is hunted.")
     pursue = Param(True, structural=True, doc="Write commands; otherwise only claim.")
@@ -49,8 +51,8 @@ class Predator(Autonomy):
         while not fits:  # repeat with more room if the claims did not fit; the targets do not change
             claims, n_claims = (np.empty(room, np.int64), np.empty(room, np.int64)), np.empty(1, np.int64)
             fits = kernels.hunt(
-                (x, y, z, self.capture_range), (g.team, self.prey_team_id), self.allow_prey_switching,
-                (self.target, target_row, *claims, n_claims), rows, g.first, table,
+                (x, y, z, self.capture_range), bodies.vel, g.dt, (g.team, self.prey_team_id),
+                (self.allow_prey_switching, self.between_steps), (self.target, target_row, *claims, n_claims), rows, g.first, table,
             )  # fmt: skip
             room = int(n_claims[0])
         wired = self.wired
