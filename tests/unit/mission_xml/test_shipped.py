@@ -27,14 +27,15 @@ PARTS = {f"straight_include/{name}.xml" for name in ("entity1", "entity2", "run_
 """Files that others include."""
 
 
-def game(*, update: str, boids: Boids, credit: str, health: float) -> Mission:
+def game(*, update: str, boids: Boids, credit: str, between: bool, health: float) -> Mission:
     """The paper's game in Python."""
 
     def hunters(name: str, team: int, north: float, *, switches: bool) -> Block:
         return Block(
             name=name, team=team, count=5, position=(2000, north, 200), placement="uniform", half_width=(500, 500, 100),
-            heading="180 deg", health=health, autonomy=Predator(max_speed=35, allow_prey_switching=switches),
-            controller=DirectController(), motion=Unicycle(vel_max=35, turn_rate_max=2, pitch_rate_max=1.5),
+            heading="180 deg", health=health, controller=DirectController(),
+            autonomy=Predator(max_speed=35, allow_prey_switching=switches, between_steps=between),
+            motion=Unicycle(vel_max=35, turn_rate_max=2, pitch_rate_max=1.5),
         )  # fmt: skip
 
     prey = Block(
@@ -43,15 +44,19 @@ def game(*, update: str, boids: Boids, credit: str, health: float) -> Mission:
     )  # fmt: skip
     return Mission(
         blocks=[prey, hunters("keepers", 2, -1000, switches=False), hunters("switchers", 3, 1000, switches=True)],
-        end=20, update=update, end_conditions="time, one_team, all_dead", interactions=[SimpleCapture(credit=credit)],
-        metrics=[SimpleCaptureMetrics()], scene=Scene(origin=Origin.from_degrees(35.721025, -120.767925, 300)),
+        end=20, update=update, end_conditions="time, one_team, all_dead",
+        interactions=[SimpleCapture(credit=credit, between_steps=between)], metrics=[SimpleCaptureMetrics()], scene=Scene(origin=Origin.from_degrees(35.721025, -120.767925, 300)),
     )  # fmt: skip
 
 
 GAMES = {
-    "predator_prey": game(update="synchronous", boids=Boids(), credit="once", health=1),
+    "predator_prey": game(update="synchronous", boids=Boids(), credit="once", between=True, health=1),
     "predator_prey_paper": game(
-        update="sequential", boids=Boids(goal_distance=1e4, averaging="historic"), credit="each", health=5
+        update="sequential",
+        boids=Boids(goal_distance=1e4, averaging="historic"),
+        credit="each",
+        between=False,
+        health=5,
     ),
 }
 

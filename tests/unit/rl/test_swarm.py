@@ -4,6 +4,7 @@ import gc
 
 import numpy as np
 import pytest
+from flee import mission
 
 from tussle import Simulation, load_run
 from tussle.errors import ParameterError
@@ -19,6 +20,7 @@ from tussle.rl import (
     make_swarm,
     record_episode,
 )
+from tussle.stock import SimpleCapture
 
 
 def play(swarm, actions, n):
@@ -176,7 +178,8 @@ def test_an_action_can_set_a_parameter_of_an_autonomy(task):
 
 
 def test_each_episode_draws_its_variables(task):
-    varied = task.replace(vary=["prey.Unicycle.vel_max=10:20"], decide_every=2)
+    harmless = mission(interactions=[SimpleCapture(capture_range=0)])
+    varied = task.replace(mission=harmless, vary=["prey.Unicycle.vel_max=10:20"], decide_every=2)
     swarm = make_swarm(varied, 40)
     swarm.reset(seed=1)
     first = swarm.simulation.read("prey.Unicycle.vel_max")[0]
