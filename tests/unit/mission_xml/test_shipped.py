@@ -42,10 +42,12 @@ def game(*, update: str, boids: Boids, credit: str, between: bool, health: float
         name="prey", team=1, count=100, position=(0, 0, 200), placement="uniform", half_width=(200, 200, 100), health=health,
         autonomy=boids, controller=DirectController(), motion=Unicycle(vel_max=30),
     )  # fmt: skip
+    keepers = hunters("keepers", 2, -1000, switches=False)
     return Mission(
-        blocks=[prey, hunters("keepers", 2, -1000, switches=False), hunters("switchers", 3, 1000, switches=True)],
+        blocks=[prey, keepers, hunters("switchers", 3, 1000, switches=True)],
         end=20, update=update, end_conditions="time, one_team, all_dead",
-        interactions=[SimpleCapture(credit=credit, between_steps=between)], metrics=[SimpleCaptureMetrics()], scene=Scene(origin=Origin.from_degrees(35.721025, -120.767925, 300)),
+        interactions=[SimpleCapture(credit=credit, between_steps=between)], metrics=[SimpleCaptureMetrics()],
+        scene=Scene(origin=Origin.from_degrees(35.721025, -120.767925, 300)),
     )  # fmt: skip
 
 
