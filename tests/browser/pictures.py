@@ -21,7 +21,7 @@ from tussle import Block, Mission, Recorder, Simulation
 from tussle.api import Autonomy, Output
 from tussle.mission import read_mission
 from tussle.stock import SingleIntegrator
-from tussle.stress import Monitor, Specification
+from tussle.stress import Monitor, RecordedMonitor, Specification, Stress
 from tussle.view import GroundMap, Live, Recording
 from tussle.view.export.html import write_html
 from tussle.view.page.access import PageRole
@@ -103,6 +103,27 @@ def two_runs(browser: Browser) -> None:
         with shown(browser, Page(pair, is_paused=True)) as watched:
             seek(watched, 12.0)
             shoot(watched, "view-two-runs")
+
+
+def why(browser: Browser) -> None:
+    """The failing game of docs/stress.md beside the saved one, with robustness and moments."""
+    example = Path(__file__).resolve().parents[2] / "examples" / "stress"
+    spec, plugins = "always (distance(left, right) > 3 m)", [example / "hover.py"]
+    given = {"run.end": 6, "left.Hover.gust": 4, "right.Hover.gust": 0}
+    study = Stress(example / "pads.xml", spec, settings=given, plugin_files=plugins, ends_by_time=True)
+    with tempfile.TemporaryDirectory() as folder:
+        worst = study.sample(1000, directory=folder).failures[0]
+        found = study.why(worst, directory=folder)
+        runs = [
+            Recording(Path(folder) / "failures" / name, plugin_files=tuple(plugins))
+            for name in ("0", "0-saved")
+        ]
+        runs[0].mark(found.saved_step * study.mission.dt, "last moment at which it could be saved")
+        runs[0].mark(found.lost_step * study.mission.dt, "lost from here on")
+        for run in runs:
+            run.watch([RecordedMonitor(spec, run)])
+        with shown(browser, Page(Comparison(*runs), is_paused=True)) as watched:
+            shoot(watched, "view-why")
 
 
 def replay(browser: Browser) -> None:
@@ -328,6 +349,7 @@ PICTURES: dict[str, Callable[[Browser], None]] = {
     "alarms": alarms,
     "experiment": experiment,
     "two-runs": two_runs,
+    "why": why,
     "replay": replay,
     "narrow": narrow,
     "dozers": dozers,

@@ -16,8 +16,10 @@ from tussle.cli.export_options import GEOGRAPHIC, ExportOptions, PlotOptions
 from tussle.cli.options import read_time
 from tussle.cli.progress import ProgressMeter, home_short
 from tussle.cli.terminal import INTERRUPTED, NOT_WRITTEN, OK, out, say, say_error, say_note
+from tussle.cli.view import tell_of
 from tussle.errors import ParameterError, ViewError
 from tussle.view.export.film import FilmOptions
+from tussle.view.page.compare import Comparison
 from tussle.view.recording import Recording
 
 TIMES = {"start": "--from", "stop": "--to", "at": "--at"}
@@ -168,7 +170,12 @@ class _Exporter:
     def write_html(self, files: Mapping[str, Path]) -> None:
         from tussle.view.export.html import write_html
 
-        report = write_html(self.recording, files["html"], period=self._options.period)
+        options, runs = self._options, [self.recording]
+        if options.other is not None:
+            runs.append(Recording(options.other, options.world or 0, tuple(options.plugin_files)))
+        tell_of(runs, options)
+        game = Comparison(*runs, is_over_each_other=options.over) if len(runs) == 2 else runs[0]
+        report = write_html(game, files["html"], period=options.period)
         _report(report.path, f"{report.n_frames:,} states of {report.n_entities:,} entities")
 
     def write_geographic(self, files: Mapping[str, Path]) -> None:
