@@ -72,6 +72,21 @@ def chase(browser: Browser) -> None:
         shoot(watched, "view-chase")
 
 
+def plain(browser: Browser) -> None:
+    """The same moment as a plain map."""
+    loaded = read_mission(GAME)
+    with (
+        Simulation(loaded.mission, 1) as simulation,
+        Live(simulation, is_paused=True, viewer=loaded.viewer) as live,
+        shown(browser, Page(live)) as watched,
+    ):
+        live.step(600)
+        watched.wait("player.frame === 600")
+        watched.press("2")
+        watched.wait("player.isPlain")
+        shoot(watched, "view-plain")
+
+
 def alarms(browser: Browser) -> None:
     """A specification that has failed, and one that was near failure."""
     loaded = read_mission(GAME)
@@ -346,6 +361,7 @@ HILLS = """<runscript name="Crates on hills"><run dt="0.1" end="60"/>
 
 PICTURES: dict[str, Callable[[Browser], None]] = {
     "chase": chase,
+    "plain": plain,
     "alarms": alarms,
     "experiment": experiment,
     "two-runs": two_runs,

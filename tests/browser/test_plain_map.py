@@ -20,6 +20,9 @@ COLOURS = """() => {
 """Colours of the plain map, and of how many pixels."""
 
 
+LOSE = """() => document.getElementById('view').getContext('webgl2').getExtension('WEBGL_lose_context').loseContext()"""
+
+
 @pytest.mark.slow
 def test_without_webgl_entities_are_drawn_chosen_and_ordered(chromium):
     browser = another_browser(chromium, "--disable-3d-apis")
@@ -86,8 +89,13 @@ def test_the_key_and_the_settings_switch_to_the_map_and_back(chromium, tmp_path)
         tab.locator("#plain-map").click()
         watched.wait("!player.isPlain && player.isDrawn")
         assert tab.locator("#plain").is_hidden()
-        watched.close()
         assert not watched.trouble, "\n".join(watched.trouble)
+        tab.evaluate(LOSE)
+        watched.wait("player.isPlain && player.isDrawn")
+        watched.press("2")
+        watched.wait("document.getElementById('said').textContent.includes('3D needs WebGL 2')")
+        assert all("CONTEXT_LOST" in text for text in watched.trouble), "\n".join(watched.trouble)
+        watched.close()
 
 
 def test_a_browser_that_draws_3d_slowly_is_given_the_map(chromium, tmp_path):

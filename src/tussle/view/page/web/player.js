@@ -111,7 +111,7 @@ export class Player {
     this.viewpoint.open();
     this.lookBack();
     this.isReady = true;
-    const slow = this.gl ? 'Drawn without a graphics card: coarser while it moves' : 'A plain map: this browser has no WebGL, which 3D needs';
+    const slow = this.gl ? 'Drawn without a graphics card: coarser while it moves; 2 draws a plain map' : 'A plain map: this browser has no WebGL, which 3D needs';
     const hints = [this.isSlow && slow, window.matchMedia('(hover: hover)').matches && 'h shows the keys'];
     this.say(hints.filter(Boolean).join(' · '));
     this.last = performance.now();
