@@ -6,6 +6,7 @@ import math
 import re
 import time
 from collections.abc import Mapping
+from copy import copy
 from datetime import datetime
 from functools import cached_property
 from pathlib import Path
@@ -16,10 +17,8 @@ from tussle.cli.export_options import GEOGRAPHIC, ExportOptions, PlotOptions
 from tussle.cli.options import read_time
 from tussle.cli.progress import ProgressMeter, home_short
 from tussle.cli.terminal import INTERRUPTED, NOT_WRITTEN, OK, out, say, say_error, say_note
-from tussle.cli.view import tell_of
 from tussle.errors import ParameterError, ViewError
 from tussle.view.export.film import FilmOptions
-from tussle.view.page.compare import Comparison
 from tussle.view.recording import Recording
 
 TIMES = {"start": "--from", "stop": "--to", "at": "--at"}
@@ -168,9 +167,12 @@ class _Exporter:
                 _report(file, f"{rows:,} {what}")
 
     def write_html(self, files: Mapping[str, Path]) -> None:
+        from tussle.cli.view import tell_of
         from tussle.view.export.html import write_html
+        from tussle.view.page.compare import Comparison
 
-        options, runs = self._options, [self.recording]
+        # A copy: what is said of the game on the page is no event of other outputs.
+        options, runs = self._options, [copy(self.recording)]
         if options.other is not None:
             runs.append(Recording(options.other, options.world or 0, tuple(options.plugin_files)))
         tell_of(runs, options)

@@ -22,7 +22,7 @@ from tussle.cli.options import (
     option,
     read_time,
 )
-from tussle.errors import MAX_SHOWN, clipped
+from tussle.errors import MAX_SHOWN, ParameterError, clipped
 
 MAX_MARK = 200
 """Characters of a mark on the time line."""
@@ -216,12 +216,17 @@ class RecordedAlarmOptions(AlarmOptions):
 
     @property
     def marks(self) -> list[tuple[float, str]]:
-        """Time [s] and text of each mark.
+        """Time [s] and text of each mark."""
+        return list(map(_mark, self.mark))
+
+    def check_alarms(self) -> None:
+        """Check the options, with the marks.
 
         Raises:
-            typer.BadParameter: One has another form.
+            typer.BadParameter: One is not allowed.
         """
-        return list(map(_mark, self.mark))
+        AlarmOptions.check_alarms(self)
+        _ = self.marks
 
 
 def _mark(given: str) -> tuple[float, str]:
@@ -231,7 +236,10 @@ def _mark(given: str) -> tuple[float, str]:
             f"--mark {clipped(given, MAX_SHOWN)!r} is not allowed; it takes a time and a text of at most {MAX_MARK} characters: "
             "'12.4=lost from here on'"
         )
-    return read_time("--mark", time), text.strip()
+    try:
+        return read_time("--mark", time), text.strip()
+    except ParameterError as error:
+        raise typer.BadParameter(str(error)) from None
 
 
 # -- pages in the browser ---------------------------------------------------------------------------------------------------

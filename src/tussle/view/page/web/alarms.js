@@ -22,9 +22,10 @@ export class AlarmPanel {
     this.told = new Set();
     this.course = byId('course');
     const { layer, page, clock, events } = player;
-    const texts = [...new Set((page.alarms || []).map(({ text }) => text))];
+    const known = (page.alarms || []).filter(({ text, id }) => layer.series.has(text, null, id));
+    const texts = [...new Set(known.map(({ text }) => text))];
     /** What has a curve above the time line, with the number of its specification. */
-    this.curves = (page.alarms || []).filter(({ text, id }) => layer.series.has(text, null, id)).map((each) => ({ ...each, number: texts.indexOf(each.text) }));
+    this.curves = known.map((each) => ({ ...each, number: texts.indexOf(each.text) }));
     this.course.hidden = !this.curves.length;
     /** Width and theme for which the curves were drawn. */
     this.drawnFor = '';
@@ -125,6 +126,8 @@ export class AlarmPanel {
     const time = (/** @type {number} */ t) => `${t.toFixed(clock.decimals)} s`;
     const measure = (/** @type {number | null} */ v) => `${amount(v ?? NaN)} ${unit}`.trim();
     if (row.className !== `spec is-${state}`) row.className = `spec is-${state}`;
+    const { number } = this.curves.find((each) => each.text === text) || {};
+    if (number !== undefined) row.querySelector('span').style.setProperty('--curve', COLOURS[number % COLOURS.length]);
     row.setAttribute('title', note || this.title(spec));
     say(stateText, since === null ? STATES[state] : `${STATES[state]} since ${time(since)}`);
     say(value, now === null ? '' : `now ${measure(now)}`);
