@@ -96,7 +96,7 @@ class RecordedMonitor:
         found: dict[str, list[np.ndarray]] = {name: [] for name in signals}
         for numbers in np.split(np.arange(len(run.steps)), _edges(run.counts)):
             frames = RecordedFrames(run, numbers.tolist())
-            view = StepView(frames, frames.bodies, ChosenRows(frames.bodies))
+            view = StepView(frames, frames.bodies, ChosenRows(frames.bodies, frames.layout))
             for name, signal in signals.items():
                 found[name].append(signal.evaluate(view))
         frame_of = np.searchsorted(run.steps, np.arange(run.steps[-1] + 1), side="right") - 1
@@ -145,6 +145,7 @@ class RecordedFrames:
     Attributes:
         t: Their times [s], (n_frames,).
         bodies: Their entities.
+        layout: Of the rows, see `ChosenRows`: that of the table has room for all ids, of which a recording may have any.
     """
 
     def __init__(self, run: RecordedStates, numbers: Sequence[int]) -> None:
@@ -153,6 +154,7 @@ class RecordedFrames:
         frames = [run.frame(i) for i in numbers]
         self._counts = [len(frame.id) for frame in frames]
         self.bodies = Bodies.empty(sum(self._counts), len(frames))
+        self.layout = np.arange(self.bodies.n), np.cumsum([0, *self._counts])
         self.bodies.world[:] = np.repeat(np.arange(len(frames)), self._counts)
         for name in ("id", "team", "block", *BODY_COLUMNS):
             column = getattr(self.bodies, name)

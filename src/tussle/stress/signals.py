@@ -58,11 +58,16 @@ class ChosenEntities:
 
 
 class ChosenRows:
-    """The rows of each selection, by world; valid until entities are born or removed."""
+    """The rows of each selection, by world; valid until entities are born or removed.
 
-    def __init__(self, bodies: Bodies) -> None:
+    Args:
+        bodies: The body table.
+        layout: Its rows by world and id, and the place where those of each world start, (n_worlds + 1,); None asks the table.
+    """
+
+    def __init__(self, bodies: Bodies, layout: tuple[np.ndarray, np.ndarray] | None = None) -> None:
         self.ints = bodies.ints
-        self._bodies = bodies
+        self._bodies, self._layout = bodies, layout
         self._chosen: dict[ChosenEntities, tuple[np.ndarray, np.ndarray]] = {}
         self._has_many: dict[tuple[ChosenEntities, ChosenEntities], bool] = {}
 
@@ -70,7 +75,7 @@ class ChosenRows:
         """ChosenRows, and the place where those of each world start, (n_worlds + 1,)."""
         if chosen not in self._chosen:
             bodies = self._bodies
-            members, start, _, _ = bodies.layout()
+            members, start = self._layout or bodies.layout()[:2]
             column = {"team": bodies.team, "block": bodies.block, "entity": bodies.id}.get(chosen.kind)
             if column is not None:
                 is_in = column[members] == chosen.number

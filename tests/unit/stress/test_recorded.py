@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -119,6 +120,14 @@ def test_a_directory_without_its_mission_or_with_another_is_refused(tmp_path):
     (tmp_path / "run/run.json").unlink()
     with pytest.raises(ParameterError, match="the blocks of its mission file are not those of its states"):
         RecordedMonitor(SPECS[0], Recording(tmp_path / "run"))
+
+
+def test_ids_may_be_large(tmp_path):
+    """A table with room for all ids of each of these frames would have a terabyte."""
+    run, seen = recorded(hunt(), tmp_path / "run")
+    frame = run.frame
+    run.frame = lambda i: replace(frame(i), id=frame(i).id + np.int32(2_000_000_000))
+    np.testing.assert_array_equal(RecordedMonitor(SPECS[0], run).progress(0)[1], seen[1])
 
 
 def test_too_many_steps_are_refused(tmp_path, monkeypatch):
