@@ -2,8 +2,8 @@
 
     python benchmarks/page.py [--sizes 200 2000 20000] [--graphics-card]
 
-Without --graphics-card everything is drawn in software. `script` is the time that the page itself takes for a frame; the rest of a
-frame is spent by the browser on drawing.
+Without --graphics-card everything is drawn in software, in 3D and as a plain map. `script` is the time that the page itself
+takes for a frame; the rest of a frame is spent by the browser on drawing.
 """
 
 from __future__ import annotations
@@ -46,16 +46,21 @@ def recorded(n: int, folder: Path) -> Recording:
     return Recording(folder, is_mapped=True)
 
 
-def measured(browser: Browser, n: int) -> tuple[float, float]:
-    """Frames per second, and time of the script per frame [ms]."""
+def measured(browser: Browser, n: int) -> list[tuple[float, float]]:
+    """Frames per second, and time of the script per frame [ms]; in 3D, and as a plain map."""
     with tempfile.TemporaryDirectory() as folder, Page(recorded(n, Path(folder)), warp=0.3) as page:
         tab = browser.new_page(viewport=WINDOW)
         tab.add_init_script(COUNT)
         tab.goto(page.url)
         tab.wait_for_timeout(4000)
-        rate, ms = tab.evaluate(MEASURE, SECONDS)
+        found = []
+        for is_plain in (False, True):
+            if tab.evaluate("() => player.isPlain") != is_plain:
+                tab.keyboard.press("2")
+                tab.wait_for_timeout(2000)
+            found.append(tuple(tab.evaluate(MEASURE, SECONDS)))
         tab.close()
-    return rate, ms
+    return found
 
 
 def main() -> None:
@@ -68,10 +73,10 @@ def main() -> None:
     with sync_playwright() as playwright:
         program = shutil.which("chromium")
         browser = playwright.chromium.launch(executable_path=program, args=["--no-sandbox", *software])
-        print("entities  frames/s  script [ms]")
+        print("entities  3D: frames/s  script [ms]  map: frames/s  script [ms]")
         for n in asked.sizes:
-            rate, ms = measured(browser, n)
-            print(f"{n:8,}  {rate:8.1f}  {ms:11.1f}")
+            (rate, ms), (plain_rate, plain_ms) = measured(browser, n)
+            print(f"{n:8,}  {rate:12.1f}  {ms:11.1f}  {plain_rate:13.1f}  {plain_ms:11.1f}")
         browser.close()
 
 

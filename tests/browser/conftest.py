@@ -8,6 +8,7 @@ from contextlib import contextmanager
 import needs
 import pytest
 from playwright.sync_api import Browser, ConsoleMessage, Page, Request, sync_playwright
+from served import UNMEASURED
 
 # Drawing without a graphics card; and nothing that the browser would ask of the network by itself.
 OPTIONS = (
@@ -60,6 +61,7 @@ def _watched(chromium: Browser) -> Iterator[Callable[..., Page]]:
 
     def new(allowed: str, **options: object) -> Page:
         page = chromium.new_page(**{"viewport": {"width": 900, "height": 650}, **options})
+        page.add_init_script(UNMEASURED)
         listen(page, allowed)
         pages.append(page)
         return page

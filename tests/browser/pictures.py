@@ -21,7 +21,7 @@ from tussle import Block, Mission, Recorder, Simulation
 from tussle.api import Autonomy, Output
 from tussle.mission import read_mission
 from tussle.stock import SingleIntegrator
-from tussle.stress import Monitor, Specification
+from tussle.stress import Monitor, RecordedMonitor, Specification, Stress
 from tussle.view import GroundMap, Live, Recording
 from tussle.view.export.html import write_html
 from tussle.view.page.access import PageRole
@@ -72,6 +72,21 @@ def chase(browser: Browser) -> None:
         shoot(watched, "view-chase")
 
 
+def plain(browser: Browser) -> None:
+    """The same moment as a plain map."""
+    loaded = read_mission(GAME)
+    with (
+        Simulation(loaded.mission, 1) as simulation,
+        Live(simulation, is_paused=True, viewer=loaded.viewer) as live,
+        shown(browser, Page(live)) as watched,
+    ):
+        live.step(600)
+        watched.wait("player.frame === 600")
+        watched.press("2")
+        watched.wait("player.isPlain")
+        shoot(watched, "view-plain")
+
+
 def alarms(browser: Browser) -> None:
     """A specification that has failed, and one that was near failure."""
     loaded = read_mission(GAME)
@@ -103,6 +118,27 @@ def two_runs(browser: Browser) -> None:
         with shown(browser, Page(pair, is_paused=True)) as watched:
             seek(watched, 12.0)
             shoot(watched, "view-two-runs")
+
+
+def why(browser: Browser) -> None:
+    """The failing game of docs/stress.md beside the saved one, with robustness and moments."""
+    example = Path(__file__).resolve().parents[2] / "examples" / "stress"
+    spec, plugins = "always (distance(left, right) > 3 m)", [example / "hover.py"]
+    given = {"run.end": 6, "left.Hover.gust": 4, "right.Hover.gust": 0}
+    study = Stress(example / "pads.xml", spec, settings=given, plugin_files=plugins, ends_by_time=True)
+    with tempfile.TemporaryDirectory() as folder:
+        worst = study.sample(1000, directory=folder).failures[0]
+        found = study.why(worst, directory=folder)
+        runs = [
+            Recording(Path(folder) / "failures" / name, plugin_files=tuple(plugins))
+            for name in ("0", "0-saved")
+        ]
+        runs[0].mark(found.saved_step * study.mission.dt, "last moment at which it could be saved")
+        runs[0].mark(found.lost_step * study.mission.dt, "lost from here on")
+        for run in runs:
+            run.watch([RecordedMonitor(spec, run)])
+        with shown(browser, Page(Comparison(*runs), is_paused=True)) as watched:
+            shoot(watched, "view-why")
 
 
 def replay(browser: Browser) -> None:
@@ -325,9 +361,11 @@ HILLS = """<runscript name="Crates on hills"><run dt="0.1" end="60"/>
 
 PICTURES: dict[str, Callable[[Browser], None]] = {
     "chase": chase,
+    "plain": plain,
     "alarms": alarms,
     "experiment": experiment,
     "two-runs": two_runs,
+    "why": why,
     "replay": replay,
     "narrow": narrow,
     "dozers": dozers,

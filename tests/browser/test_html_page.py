@@ -487,7 +487,7 @@ def test_two_fingers_come_nearer_on_a_narrow_screen(watched, hunted):
 @pytest.mark.parametrize(
     ("missing", "words"),
     [
-        ("HTMLCanvasElement.prototype.getContext = () => null", "WebGL 2"),
+        ("HTMLCanvasElement.prototype.getContext = () => null", "WebGL 2 or on a 2D canvas"),
         ("delete window.DecompressionStream", "DecompressionStream"),
     ],
 )

@@ -8,6 +8,7 @@ from served import Watched
 from watched_plugins import clickable
 
 from tussle import Recorder, Simulation
+from tussle.stress import RecordedMonitor
 from tussle.view import Recording
 from tussle.view.page import recorded as recorded_data
 from tussle.view.page.compare import Comparison
@@ -128,3 +129,42 @@ def test_columns_of_plugins_are_shown_beside_the_entity(chromium, tmp_path, monk
         assert watched.tab.locator("#sections dt").first.get_attribute("title") == "Current goal."
         watched.close()
         assert not watched.trouble, "\n".join(watched.trouble)
+
+
+def test_a_specification_of_two_runs_has_a_curve_of_each_over_the_time_line(chromium, runs):
+    spec = "always (distance(prey, hunters) > 21 m)"
+    shown = [Recording(run.path, is_mapped=True) for run in runs]
+    shown[0].mark(12.0, "lost from here on")
+    for run in shown:
+        run.watch([RecordedMonitor(spec, run)], 3.0)
+    both = Comparison(*shown)
+    with Page(both, is_paused=True) as page:
+        watched = Watched(chromium, page)
+        watched.wait("player.isDrawn")
+        watched.press("End")
+        watched.wait("player.t >= 19.9 && player.isDrawn")
+        rows = [row.inner_text() for row in watched.tab.locator("#alarms .spec").all()]
+        for name, run, row in zip("AB", shown, rows, strict=True):
+            (course,) = run.alarms.courses
+            assert f"failed since {course.failed:.1f} s" in row
+            assert f"{name}: {spec}" in row
+            assert f"least {course.least[-1]:.4g}".replace("-", "\u2212") in row
+        for id_, run in ((0, shown[0]), (both.id_shift, shown[1])):
+            (series,) = run.alarms.series.values()
+            curve = watched.tab.evaluate("([name, id]) => player.curve(name, null, id)", [spec, id_])
+            assert [t for t, _ in curve] == pytest.approx([run.time_of(step) for step in series.steps])
+            assert [v for _, v in curve] == pytest.approx(series.values, nan_ok=True)
+        mark = watched.tab.evaluate("() => player.events.find(({ kind }) => kind === 'mark')")
+        assert (mark["t"], mark["text"]) == (12.0, "lost from here on")
+        box = watched.tab.locator("#course").bounding_box()
+        watched.tab.mouse.click(box["x"] + box["width"] / 2, box["y"] + 20)
+        watched.wait("Math.abs(player.t - 10) < 0.1 && player.isDrawn")
+        assert watched.tab.evaluate(DRAWN) > 1000
+        watched.close()
+        assert not watched.trouble, "\n".join(watched.trouble)
+
+
+DRAWN = """() => {
+  const canvas = document.querySelector('#course canvas');
+  return canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height).data.filter(Boolean).length;
+}"""

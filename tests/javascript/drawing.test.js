@@ -7,6 +7,7 @@ import { decimalsOf, eventText, length, number, times } from '../../src/tussle/v
 import { forward, halfTurn, minus, norm, rotated, turned, unit } from '../../src/tussle/view/page/web/geometry.js';
 import { geodeticOf, sidesOf } from '../../src/tussle/view/page/web/geodesy.js';
 import { coarse, prepared } from '../../src/tussle/view/page/web/models.js';
+import { affine, facesFromAbove, headingOf } from '../../src/tussle/view/page/web/plain.js';
 import { Reader } from '../../src/tussle/view/page/web/packing.js';
 import { linkOpacity, pairsWithin, sectorMesh } from '../../src/tussle/view/page/web/reach.js';
 
@@ -199,4 +200,41 @@ test('latitude and longitude of a place are those of geodesy.py, to a millimetre
   assert.equal(geodeticOf([0, 0, 0], [2e6, 0, 0]), null);
   assert.deepEqual(sidesOf([-33.9, 18.4]), ['33.900000° S', '18.400000° E']);
   assert.deepEqual(sidesOf([0, -0.0000012]), ['0.000000° N', '0.000001° W']);
+});
+
+test('a plain map has north up and one scale, whatever the height, and a pixel leads back to its place', () => {
+  const camera = new Camera(100);
+  camera.look([30, -50, 20], [1, 2, 3]);
+  camera.isPlain = true;
+  const view = camera.view(400, 300, 1, [10, 20, 0]);
+  isNear(pixelOf(view, [1, 2, 3]).slice(0, 2), [200, 150], 1e-6);
+  const perMetre = 1 / (view.perPixel * view.distance);
+  for (const height of [-500, 3, 1e4]) isNear(pixelOf(view, [6, 12, height]).slice(0, 2), [200 + 5 * perMetre, 150 - 10 * perMetre], 1e-6);
+  const [a, b, c, d, e, f] = affine(view);
+  isNear([a * -4 + c * -8 + e, b * -4 + d * -8 + f], pixelOf(view, [6, 12, 7]), 1e-6);
+  isNear(placeBehind(view, camera, ...pixelOf(view, [6, 12, 3]).slice(0, 2)), [6, 12, 3], 1e-6);
+});
+
+test('behind an entity, a plain map has its heading up; panels leave room as in 3D', () => {
+  const camera = new Camera(100);
+  camera.isPlain = true;
+  camera.enter('behind', [0, 0, 0], 0.3);
+  isNear(rested(camera).axes().up, [Math.cos(0.3), Math.sin(0.3), 0], 1e-6);
+  camera.enter('overview');
+  const places = [[0, 0, 0], [80, 5, 3000], [-30, 60, 10], [10, -90, -40]];
+  camera.fit((see) => places.forEach(([x, y, z]) => see(x, y, z)), 4 / 3, { left: 0.1, right: 0.2, top: 0.1, bottom: 0.3 });
+  const pixels = places.map((place) => pixelOf(rested(camera).view(400, 300, 1, [0, 0, 0]), place));
+  for (const [x, y] of pixels) assert.ok(x > 39 && x < 321 && y > 29 && y < 211, `${x}, ${y}`);
+  const heights = pixels.map(([, y]) => y);
+  assert.ok(Math.max(...heights) - Math.min(...heights) > 179, 'it is as near as it can be');
+});
+
+test('from above, faces that look up are seen, and headings are those of level bodies', () => {
+  const box = { vertices: [0, 1, 2, 3, 4, 5, 6, 7].flatMap((i) => [(i & 1) - 0.5, ((i >> 1) & 1) - 0.5, (i >> 2) - 0.5]),
+    faces: [0, 3, 1, 0, 2, 3, 4, 5, 7, 4, 7, 6, 0, 1, 5, 0, 5, 4, 1, 3, 7, 1, 7, 5, 3, 2, 6, 3, 6, 7, 2, 0, 4, 2, 4, 6] };
+  const area = (/** @type {number[][][]} */ faces) => faces.reduce((sum, [p, q, r]) => sum + 0.5 * ((q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0])), 0);
+  isNear([area(facesFromAbove(box, [1, 0, 0, 0], [4, 2, 1]))], [8]);
+  isNear([area(facesFromAbove(box, [Math.SQRT1_2, Math.SQRT1_2, 0, 0], [4, 2, 1]))], [4], 1e-6);
+  isNear(headingOf([Math.cos(0.4), 0, 0, Math.sin(0.4)]), [Math.cos(0.8), Math.sin(0.8)]);
+  isNear(headingOf([Math.SQRT1_2, 0, Math.SQRT1_2, 0]), [1, 0], 1e-3);
 });

@@ -64,6 +64,22 @@ test('a recording whose data cannot be read says so', async () => {
   assert.equal(errors[0].message, 'gone');
 });
 
+test('a specification is as the last moment says, and an alarm stays', async () => {
+  const alarms = [
+    { id: 0, text: 'far', unit: 'm', near: 0.5, failed: 1, t: [0, 0.5, 1], least: [3, 0.5, -1], note: '' },
+    { id: 0, text: 'broken', unit: '', near: /** @type {null} */ (null), failed: /** @type {null} */ (null), t: [], least: [], note: 'no number' },
+  ];
+  const changes = [{ name: 'far', team: /** @type {null} */ (null), id: 0, from: 0, t: [0, 0.5, 1, 1.5], v: [3, 0.5, -1, 2] }];
+  const layer = new Recorded(pageData({ nFrames: 1, alarms }), sourceOf({}), () => {}, assert.fail);
+  layer.series.take(changes);
+  const at = (/** @type {number} */ t) => layer.alarmsAt(t)[0];
+  assert.deepEqual([at(0).state, at(0).since, at(0).now, at(0).least], ['holds', null, 3, 3]);
+  assert.deepEqual([at(0.7).state, at(0.7).since, at(0.7).reached], ['near', 0.5, 0.5]);
+  assert.deepEqual([at(1.6).state, at(1.6).since, at(1.6).now, at(1.6).least], ['failed', 1, 2, -1]);
+  assert.deepEqual([at(-1).state, at(-1).now, at(-1).least], ['open', null, null]);
+  assert.deepEqual([layer.alarmsAt(1)[1].state, layer.alarmsAt(1)[1].note], ['unknown', 'no number']);
+});
+
 test('shapes are read in groups of frames, and last until the next ones', async () => {
   const layer = await recorded();
   assert.equal((await shown(layer, 1)) && layer.shapesShown(), null);

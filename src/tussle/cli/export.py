@@ -6,6 +6,7 @@ import math
 import re
 import time
 from collections.abc import Mapping
+from copy import copy
 from datetime import datetime
 from functools import cached_property
 from pathlib import Path
@@ -166,9 +167,17 @@ class _Exporter:
                 _report(file, f"{rows:,} {what}")
 
     def write_html(self, files: Mapping[str, Path]) -> None:
+        from tussle.cli.view import tell_of
         from tussle.view.export.html import write_html
+        from tussle.view.page.compare import Comparison
 
-        report = write_html(self.recording, files["html"], period=self._options.period)
+        # A copy: what is said of the game on the page is no event of other outputs.
+        options, runs = self._options, [copy(self.recording)]
+        if options.other is not None:
+            runs.append(Recording(options.other, options.world or 0, tuple(options.plugin_files)))
+        tell_of(runs, options)
+        game = Comparison(*runs, is_over_each_other=options.over) if len(runs) == 2 else runs[0]
+        report = write_html(game, files["html"], period=options.period)
         _report(report.path, f"{report.n_frames:,} states of {report.n_entities:,} entities")
 
     def write_geographic(self, files: Mapping[str, Path]) -> None:

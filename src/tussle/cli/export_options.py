@@ -18,6 +18,7 @@ from tussle.cli.options import (
     flag,
     option,
 )
+from tussle.cli.play_options import RecordedAlarmOptions
 
 DEFAULT_NAMES = {
     "html": "replay.html",
@@ -45,11 +46,12 @@ USED_BY = {
     "scale": (*IMAGES, "mcap"),
     **dict.fromkeys(("map_file", "map_bounds"), (*IMAGES, "html", "mcap")),
     "period": ("html", "mcap", "rosbag2", *GEOGRAPHIC),
+    **dict.fromkeys(("other", "over", "spec", "margin", "mark"), ("html",)),
     "epoch": ("kml", "czml"),
     "storage": ("rosbag2",),
 }  # fmt: skip
 """Outputs that use an option."""
-SPECIAL_NAMES = {"start": "--from", "stop": "--to", "map_file": "--map"}
+SPECIAL_NAMES = {"start": "--from", "stop": "--to", "map_file": "--map", "other": "a second run"}
 
 
 class ExportCommand(TussleCommand):
@@ -71,10 +73,12 @@ def _output(name: str, what: str) -> Any:
 
 
 @dataclass(frozen=True, kw_only=True)
-class ExportOptions(MapOptions, PluginOptions):
+class ExportOptions(MapOptions, PluginOptions, RecordedAlarmOptions):
     """Convert a recorded run to a web page, film, image or tables; several outputs at once are possible."""
 
     run: Annotated[Path, argument("RUN", "A run directory, complete or not.")]
+    other: Annotated[Path | None, argument("[RUN2]", "With --html, another run beside the first.")] = None
+    over: Annotated[bool, flag("--over", "Draw two runs in one place, not next to each other.")] = False
     html: Annotated[Path | None, _output("html", "A web page that replays the run offline.")] = None
     mp4: Annotated[Path | None, _output("mp4", "A film (H.264).")] = None
     gif: Annotated[Path | None, _output("gif", "A small animation.")] = None
@@ -128,10 +132,15 @@ class ExportOptions(MapOptions, PluginOptions):
         if not self.files:
             raise typer.BadParameter(f"no output is given; possible outputs: {_listed(DEFAULT_NAMES, ', ')}")
         for name, outputs in USED_BY.items():
-            if getattr(self, name) not in (None, False) and not any(each in self.files for each in outputs):
+            if getattr(self, name) not in (None, False, []) and not any(
+                each in self.files for each in outputs
+            ):
                 shown = SPECIAL_NAMES.get(name, f"--{name.replace('_', '-')}")
                 raise typer.BadParameter(f"{shown} is allowed with {_listed(outputs, ' or ')} only")
+        if self.over and self.other is None:
+            raise typer.BadParameter("--over draws two runs in one place; a second run is required")
         check_positive(period=self.period)
+        self.check_alarms()
 
     @property
     def files(self) -> dict[str, Path]:

@@ -20,8 +20,12 @@ from tussle.cli.options import (
     columns_option,
     flag,
     option,
+    read_time,
 )
-from tussle.errors import MAX_SHOWN, clipped
+from tussle.errors import MAX_SHOWN, ParameterError, clipped
+
+MAX_MARK = 200
+"""Characters of a mark on the time line."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -171,6 +175,73 @@ class NewOptions:
     )
 
 
+@dataclass(frozen=True, kw_only=True)
+class AlarmOptions:
+    """Specifications that a page shows."""
+
+    spec: Annotated[
+        list[str],
+        option(
+            "SPEC",
+            "Show how far the game is from breaking this, and alarms: 'always (distance(team 1, team 1) > 2 m)'. Can be repeated.",
+        ),
+    ] = field(default_factory=list)
+    margin: Annotated[
+        float | None,
+        option(
+            "X",
+            "With --spec: alarm within this distance of failing, in the unit compared (SI); by default 1.",
+        ),
+    ] = None
+
+    def check_alarms(self) -> None:
+        """Check the options.
+
+        Raises:
+            typer.BadParameter: There is a margin without a specification, or it is not positive.
+        """
+        if self.margin is not None and not self.spec:
+            raise typer.BadParameter("--margin is allowed with --spec only")
+        check_positive(margin=self.margin)
+
+
+@dataclass(frozen=True, kw_only=True)
+class RecordedAlarmOptions(AlarmOptions):
+    """Specifications and moments that the page of a recorded game shows."""
+
+    mark: Annotated[
+        list[str],
+        option("TIME=TEXT", "Mark this moment on the time line: '12.4=lost from here on'. Can be repeated."),
+    ] = field(default_factory=list)
+
+    @property
+    def marks(self) -> list[tuple[float, str]]:
+        """Time [s] and text of each mark."""
+        return list(map(_mark, self.mark))
+
+    def check_alarms(self) -> None:
+        """Check the options, with the marks.
+
+        Raises:
+            typer.BadParameter: One is not allowed.
+        """
+        AlarmOptions.check_alarms(self)
+        _ = self.marks
+
+
+def _mark(given: str) -> tuple[float, str]:
+    time, sign, text = given.partition("=")
+    if not sign or not text.strip() or len(text) > MAX_MARK:
+        raise typer.BadParameter(
+            f"--mark {clipped(given, MAX_SHOWN)!r} is not allowed; it takes a time and a text of at most {MAX_MARK} characters: "
+            "'12.4=lost from here on'"
+        )
+    try:
+        return read_time("--mark", time), text.strip()
+    except ParameterError as error:
+        raise typer.BadParameter(str(error)) from None
+
+
 # -- pages in the browser ---------------------------------------------------------------------------------------------------
 
 
@@ -216,7 +287,7 @@ class PageOptions(MapOptions, PluginOptions):
 
 
 @dataclass(frozen=True, kw_only=True)
-class ViewOptions(AgainOptions, PageOptions):
+class ViewOptions(AgainOptions, PageOptions, AlarmOptions):
     """Play one game live on a page in the browser: pause it, step it, rewind it, follow entities."""
 
     pace: Annotated[
@@ -247,20 +318,6 @@ class ViewOptions(AgainOptions, PageOptions):
             "Let orders come later [s], be lost with a probability, or share a bandwidth [bytes/s]; show the game later [s].",
         ),
     ] = None
-    spec: Annotated[
-        list[str],
-        option(
-            "SPEC",
-            "Show how far the game is from breaking this, and alarms: 'always (distance(team 1, team 1) > 2 m)'. Can be repeated.",
-        ),
-    ] = field(default_factory=list)
-    margin: Annotated[
-        float | None,
-        option(
-            "X",
-            "With --spec: alarm within this distance of failing, in the unit compared (SI); by default 1.",
-        ),
-    ] = None
     exit_when_over: Annotated[bool, flag("--exit-when-over", "End with the game, not only by Ctrl-C.")] = (
         False
     )
@@ -270,9 +327,7 @@ class ViewOptions(AgainOptions, PageOptions):
         PageOptions.__post_init__(self)
         if self.record_columns is not None and self.record is None:
             raise typer.BadParameter("--record-columns is allowed with --record only")
-        if self.margin is not None and not self.spec:
-            raise typer.BadParameter("--margin is allowed with --spec only")
-        check_positive(margin=self.margin)
+        self.check_alarms()
         if len(self.operators) < len(self.operator):
             raise typer.BadParameter("--operator: a name is given twice")
 
@@ -292,7 +347,7 @@ def _operator(text: str) -> tuple[str, int]:
 
 
 @dataclass(frozen=True, kw_only=True)
-class ReplayOptions(PageOptions):
+class ReplayOptions(PageOptions, RecordedAlarmOptions):
     """Play a recorded run on a page in the browser, or two runs from the moment at which they differ."""
 
     run: Annotated[Path, argument("RUN", "A run directory, complete or not.")]
@@ -306,7 +361,8 @@ class ReplayOptions(PageOptions):
     world: Annotated[int, option("N", "World of a stack.", min=0, shows_default=True)] = 0
 
     def __post_init__(self) -> None:
-        super().__post_init__()
+        PageOptions.__post_init__(self)
+        self.check_alarms()
         if self.over and self.other is None:
             raise typer.BadParameter("--over draws two runs in one place; a second run is required")
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from rich.text import Text
 
 from tussle.batch.statistics import scipy_package
 from tussle.batch.store import reported
@@ -26,6 +27,7 @@ from tussle.stress.confidence import Assurance, junit_xml
 from tussle.stress.estimates import Probability, Sample
 from tussle.stress.games import Played
 from tussle.stress.importance import ImportanceEstimate
+from tussle.stress.recorded import unrecorded
 from tussle.stress.results import FAILURES, MAX_FAILURES, saved_file
 from tussle.stress.search import FailureSearch, label
 from tussle.stress.shrink import SmallestGame
@@ -308,6 +310,19 @@ def show_why(why: Why, study: Stress, directory: Path, options: StressOptions) -
     ]
     put("", *number_tables(["other than it was", "from t [s] on", "games that fail", "undoes it"], rows))
     put("", fact_list(why_facts(why, study, directory, options)))
+    put("", Text(f" {replay_command(why, study, directory, options)}", no_wrap=True))
+
+
+def replay_command(why: Why, study: Stress, directory: Path, options: StressOptions) -> str:
+    """The command that shows the failing game beside the saved one, with the robustness of both."""
+    games = [f"{FAILURES}/0.xml", *([] if why.saved is None else [saved_file(f"{FAILURES}/0.xml")])]
+    words = ["tussle", "replay", *(str(directory / name.removesuffix(".xml")) for name in games)]
+    if not unrecorded(study.specification, study.mission):
+        words += ["--spec", options.spec or ""]
+    if why.saved_step is not None:
+        words += ["--mark", f"{time_of(why.saved_step, study)}=last moment at which it could be saved"]
+    words += ["--mark", f"{time_of(why.lost_step, study)}=lost from here on"]
+    return shlex.join(words) + plugin_files(options)
 
 
 def why_facts(why: Why, study: Stress, directory: Path, options: StressOptions) -> list[tuple[str, str]]:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from tussle.cli.interrupt import Interrupt
 from tussle.cli.play import planned_by, record, simulate
-from tussle.cli.play_options import PageOptions, ReplayOptions, ViewOptions
+from tussle.cli.play_options import PageOptions, RecordedAlarmOptions, ReplayOptions, ViewOptions
 from tussle.cli.progress import compiling
 from tussle.cli.summary import Speed, show_summary
 from tussle.cli.terminal import OK, TERMINATED, err, out, say, say_error, say_note
@@ -145,6 +145,7 @@ def replay(options: ReplayOptions) -> int:
         for path in (options.run, options.other)
         if path is not None
     ]
+    tell_of(runs, options)
     game = Comparison(*runs, is_over_each_other=options.over) if len(runs) == 2 else runs[0]
     with ExitStack() as stack:
         interrupt = stack.enter_context(Interrupt())
@@ -153,6 +154,23 @@ def replay(options: ReplayOptions) -> int:
         )
         announce(page, options)
         return watch(page, interrupt, lambda: False)
+
+
+def tell_of(runs: Sequence[Recording], options: RecordedAlarmOptions) -> None:
+    """Show specifications of recorded games, and marks on the time line of the first.
+
+    Raises:
+        ParameterError: A text is no specification, or speaks of what was not recorded.
+    """
+    for t, text in options.marks:
+        runs[0].mark(t, text)
+    if not options.spec:
+        return
+    from tussle.stress import RecordedMonitor
+
+    for run in runs:
+        monitors = [RecordedMonitor(text, run) for text in dict.fromkeys(options.spec)]
+        run.watch(monitors, 1.0 if options.margin is None else options.margin)
 
 
 def announce(page: Page, options: PageOptions) -> None:

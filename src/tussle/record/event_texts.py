@@ -13,6 +13,7 @@ EVENT_TEXTS = {
     "difference": ["the two runs differ from here on"],
     "failure": ["failed: {text}"],
     "flag": ["{id} {text}"],
+    "mark": ["{text}"],
     "end": ["the game ended: {text}"],
 }
 """Sentences of each kind of event; the first one whose parts are all known is used. The page has them from here."""

@@ -8,6 +8,7 @@ from tussle.stress.games import Played, StressGame
 from tussle.stress.given import GivenGame, given_games
 from tussle.stress.importance import ImportanceEstimate
 from tussle.stress.monitor import Monitor, Verdict
+from tussle.stress.recorded import RecordedMonitor
 from tussle.stress.search import FailureSearch, Tried
 from tussle.stress.shrink import SmallestGame
 from tussle.stress.specification import Specification
@@ -26,6 +27,7 @@ __all__ = [
     "Monitor",
     "Played",
     "Probability",
+    "RecordedMonitor",
     "Repetition",
     "Sample",
     "SmallestGame",

@@ -162,16 +162,12 @@ class Monitor:
         spec, sim, signals = self.specification, self.sim, self.trace(world)
         is_over = not sim.state.running[world]
         columns = columns_of(sim.result(is_hashed=False)[world]) if spec.quantities else {}
-        known, n = spec.known(signals, columns), int(sim.state.context.clock.step[world]) + 1
-        ended = float(known[-1])
-        if not signals:  # quantities alone are known at the end
-            known = np.full(n, np.inf)
-            known[-1] = ended if is_over else np.inf
-            return known, np.full(n, np.nan), ended
-        if not is_over:  # with one more sample, the last one counts as one of a game that goes on
-            longer = {name: np.append(values, values[-1]) for name, values in signals.items()}
-            known = spec.known(longer, columns)[:n]
-        return known, spec.present(signals, columns), ended
+        if signals:
+            return spec.progress(signals, columns, is_over)
+        n, ended = int(sim.state.context.clock.step[world]) + 1, float(spec.known(signals, columns)[-1])
+        known = np.full(n, np.inf)  # quantities alone are known at the end
+        known[-1] = ended if is_over else np.inf
+        return known, np.full(n, np.nan), ended
 
     def robustness(self) -> np.ndarray:
         """Robustness of each world, (n_worlds,): of the whole game where it has ended, else of the game so far."""

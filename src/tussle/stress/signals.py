@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -58,11 +58,16 @@ class ChosenEntities:
 
 
 class ChosenRows:
-    """The rows of each selection, by world; valid until entities are born or removed."""
+    """The rows of each selection, by world; valid until entities are born or removed.
 
-    def __init__(self, bodies: Bodies) -> None:
+    Args:
+        bodies: The body table.
+        layout: Its rows by world and id, and the place where those of each world start, (n_worlds + 1,); None asks the table.
+    """
+
+    def __init__(self, bodies: Bodies, layout: tuple[np.ndarray, np.ndarray] | None = None) -> None:
         self.ints = bodies.ints
-        self._bodies = bodies
+        self._bodies, self._layout = bodies, layout
         self._chosen: dict[ChosenEntities, tuple[np.ndarray, np.ndarray]] = {}
         self._has_many: dict[tuple[ChosenEntities, ChosenEntities], bool] = {}
 
@@ -70,7 +75,7 @@ class ChosenRows:
         """ChosenRows, and the place where those of each world start, (n_worlds + 1,)."""
         if chosen not in self._chosen:
             bodies = self._bodies
-            members, start, _, _ = bodies.layout()
+            members, start = self._layout or bodies.layout()[:2]
             column = {"team": bodies.team, "block": bodies.block, "entity": bodies.id}.get(chosen.kind)
             if column is not None:
                 is_in = column[members] == chosen.number
@@ -87,17 +92,25 @@ class ChosenRows:
         return self._has_many[a, b]
 
 
+class SignalSource(Protocol):
+    """What signals are computed of, beside a body table: a simulation, or frames of a recorded game."""
+
+    @property
+    def t(self) -> np.ndarray: ...
+    def read(self, path: str) -> tuple[np.ndarray, np.ndarray]: ...
+
+
 @dataclass
 class StepView:
     """The state that signals are computed from.
 
     Attributes:
-        sim: The simulation.
+        sim: The simulation, or what stands in for it.
         bodies: Its body table, or that of a world that has ended.
         rows: ChosenRows of selections.
     """
 
-    sim: Simulation
+    sim: SignalSource
     bodies: Bodies
     rows: ChosenRows
 
@@ -160,11 +173,15 @@ class Signal:
         text: As it is written, in one way.
         unit: Its dimension; None where it is not known.
         evaluate: Returns the values, (n_worlds,).
+        is_function: It is a function of the simulation.
+        column: Path of the column that it reads; "" for none.
     """
 
     text: str
     unit: Dimension | None
     evaluate: Evaluate = field(compare=False, repr=False)
+    is_function: bool = False
+    column: str = ""
 
     def __str__(self) -> str:
         return self.text
@@ -207,7 +224,7 @@ class Factory:
             ParameterError: There is no such signal, or an argument is not allowed.
         """
         if name in self.functions and not arguments:
-            return Signal(f"{name}()", None, _checked(name, self.functions[name]))
+            return Signal(f"{name}()", None, _checked(name, self.functions[name]), is_function=True)
         if name not in self.kinds:
             known = [*self.kinds, *self.functions]
             raise ParameterError(f"there is no signal {name!r}{nearest_name(name, known)}; {listed(known)}")
@@ -215,7 +232,8 @@ class Factory:
         if len(arguments) != n:
             raise ParameterError(f"{name}() takes {n} argument{'s' * (n != 1)}, not {len(arguments)}")
         unit, evaluate = make(*arguments)
-        return Signal(f"{name}({', '.join(arguments)})", unit, evaluate)
+        column = arguments[0] if name in ("min", "max") else ""
+        return Signal(f"{name}({', '.join(arguments)})", unit, evaluate, column=column)
 
     def selection(self, text: str) -> ChosenEntities:
         """Entities by their text."""
@@ -313,6 +331,7 @@ class Factory:
 
 def _checked(name: str, function: Callable[[Simulation], Any]) -> Evaluate:
     def evaluate(f: StepView) -> np.ndarray:
+        assert isinstance(f.sim, Simulation)  # others have no functions
         values = np.asarray(function(f.sim), dtype=np.float64)
         if values.shape != (f.sim.n_worlds,):
             raise ParameterError(

@@ -125,6 +125,17 @@ class Specification:
         """Robustness of each sample alone, (n_samples,), see `Formula.present`; arguments and errors as of `known`."""
         return self.formula.present(self._traces(signals, result))
 
+    def progress(
+        self, signals: Mapping[str, np.ndarray], result: Mapping[str, float], is_over: bool
+    ) -> tuple[np.ndarray, np.ndarray, float]:
+        """What a game has shown, which may go on: see `tussle.stress.Monitor.progress`; arguments and errors as of `known`."""
+        known = self.known(signals, result)
+        ended, n = float(known[-1]), len(known)
+        if not is_over:  # with one more sample, the last one counts as one of a game that goes on
+            longer = {name: np.append(values, values[-1]) for name, values in signals.items()}
+            known = self.known(longer, result)[:n]
+        return known, self.present(signals, result), ended
+
     def _traces(
         self, signals: Mapping[str, np.ndarray], result: Mapping[str, float]
     ) -> dict[str, np.ndarray]:

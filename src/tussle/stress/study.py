@@ -35,7 +35,7 @@ from tussle.stress.estimates import Probability, Sample, worst_first
 from tussle.stress.games import GamePlayer, Ledger, Played, StressGame
 from tussle.stress.importance import ImportanceEstimate, entry, estimate
 from tussle.stress.monitor import Watching
-from tussle.stress.results import write_result, write_why
+from tussle.stress.results import record_game, write_result, write_why
 from tussle.stress.search import FailureSearch, label, search, searcher
 from tussle.stress.shrink import MAX_SHRINK_GAMES, SmallestGame, shrink
 from tussle.stress.specification import Function, Specification, columns_of
@@ -448,7 +448,7 @@ class Stress:
             moments: Moments of the overview, as of `chances`.
             branches: Games of each row, and from each moment.
             directory: Where games are kept, and the result is added to that of `sample`, `probability` or `search`, with the nearest
-                passing game as `failures/N-saved.xml`; None keeps them in memory.
+                passing game as `failures/N-saved.xml` and recordings of both; None keeps them in memory.
             how: `executor`, `processes`, `stack` and `on_game`, as for `GamePlayer`.
 
         Raises:
@@ -463,7 +463,7 @@ class Stress:
             explanation = Explanation(player.play, failed, mission, self.watching, self.mission_of, branches)
             found = explanation.find(moments)
             if ledger is not None and self._written is not None and self._written[0] == ledger.path:
-                write_why(*self._written, found, self.failing_mission)
+                write_why(*self._written, found, self.failing_mission, self._record)
         return found
 
     def smallest(self, failed: Played, max_games: int = MAX_SHRINK_GAMES) -> SmallestGame:
@@ -538,6 +538,11 @@ class Stress:
     def failing_mission(self, game: StressGame) -> str:
         """A mission file that plays a game again, with its seed and its luck."""
         return to_xml(self.mission_of(game).replace(rekeys=game.rekeys), game.seed)
+
+    def _record(self, game: StressGame, directory: Path) -> None:
+        mission = self.mission_of(game).replace(rekeys=game.rekeys)
+        files = () if self.batch.loaded is None else self.batch.loaded.plugin_files
+        record_game(mission, game.seed, self.specification, files, directory)
 
     def _write(self, ledger: Ledger | None, failures: Sequence[Played], result: Mapping[str, Any]) -> None:
         """Write the result, and the worst failures as missions."""

@@ -62,6 +62,29 @@ class SpecificationState:
     note: str = ""
 
 
+@dataclass(frozen=True)
+class SpecificationCourse:
+    """How a game that is known to its end came near to breaking a specification.
+
+    Attributes:
+        text: The specification.
+        unit: SI unit of the numbers.
+        near: Time from which on it is within the margin [s]; None for never.
+        failed: Time from which on it has failed [s]; None for never.
+        t: Times at which the least robustness so far falls [s].
+        least: What it falls to; None for -inf.
+        note: Why it cannot be computed.
+    """
+
+    text: str
+    unit: str
+    near: float | None
+    failed: float | None
+    t: list[float]
+    least: list[float | None]
+    note: str = ""
+
+
 class _Watched:
     """One specification, as far as the game was played."""
 
@@ -111,6 +134,17 @@ class _Watched:
         reached = time_of(int(np.searchsorted(-self.known, -least))) if least < math.inf else None
         return SpecificationState(text, unit, state, now, ended, least, reached, since)
 
+    def course(self, margin: float, time_of: Callable[[int], float]) -> SpecificationCourse:
+        text, unit = self.monitor.text, self.monitor.unit
+        (falls,) = np.nonzero(self.known < np.append(math.inf, self.known[:-1]))
+        near, failed = (
+            None if step is None else time_of(step) for step in map(self.first_below, (margin, 0.0))
+        )
+        least = [value if math.isfinite(value) else None for value in self.known[falls].tolist()]
+        return SpecificationCourse(
+            text, unit, near, failed, list(map(time_of, falls.tolist())), least, self.note
+        )
+
 
 class SpecificationAlarms:
     """Follows specifications in one world that is played, rewound, and played again.
@@ -157,6 +191,11 @@ class SpecificationAlarms:
             for each in self._watched:
                 each.read(self._world, is_over)
         return [each.state_at(step, self._margin, self._time_of) for each in self._watched]
+
+    @property
+    def courses(self) -> list[SpecificationCourse]:
+        """What each specification came to, of a game that was read to its end."""
+        return [each.course(self._margin, self._time_of) for each in self._watched]
 
     @property
     def events(self) -> list[Event]:

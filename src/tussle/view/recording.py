@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Iterable, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -20,6 +21,7 @@ from tussle.record import Run, load_run
 from tussle.record.plugin_columns import PluginColumn
 from tussle.record.plugin_copies import copied_plugins
 from tussle.record.schema import MISSION_FILE, RUN_FILE, SHAPES_FILE, TRAJECTORY_FILE
+from tussle.view.alarms import SpecificationAlarms, SpecificationMonitor
 from tussle.view.drawn import Shape
 from tussle.view.frame import Event, Frame, empty_frame
 from tussle.view.ground_map import GroundMap
@@ -64,6 +66,7 @@ class Recording:
         t: Time of each frame [s], (T,), ascending.
         steps: Step of each frame, (T,).
         notes: Missing parts of the run, and notes about its mission, one line each.
+        alarms: What `watch` has found of specifications; None before.
         id_shift: Offset of the ids: 0.
 
     Raises:
@@ -88,6 +91,7 @@ class Recording:
         self._is_mapped = is_mapped
         self.notes: list[str] = [*self.run.notes, *self.run.mission_notes]
         self._plugin_files = plugin_files
+        self.alarms: SpecificationAlarms | None = None
         table = self.run.trajectory_table
         self._batches = table.to_batches()
         self._starts = np.cumsum([0, *(b.num_rows for b in self._batches)])
@@ -402,6 +406,40 @@ class Recording:
         rows = [mine[name].to_pylist() for name in ("t", "kind", "id", "other", "text")]
         found = [Event(*row) for row in zip(*rows, strict=True)]
         return sorted(found, key=lambda event: event.t)
+
+    # -- what is said about the game ------------------------------------------------------------------------------------------
+
+    def watch(self, monitors: Sequence[SpecificationMonitor], margin: float = 1.0) -> None:
+        """Show specifications on pages: how far the game is from breaking them, and alarms among the events.
+
+        Args:
+            monitors: One for each, such as `tussle.stress.RecordedMonitor`.
+            margin: Distance from failure below which there is an alarm, in the SI unit of what is compared.
+        """
+        self.alarms = SpecificationAlarms(monitors, margin, self.world, self.time_of)
+        self.alarms.read(int(self.steps[-1]), True)
+        stride = int(np.diff(self.steps, prepend=0).max())
+        if stride > 1:
+            self.notes.append(
+                f"{self.path.resolve().name} has states up to {stride * self.dt:g} s apart; specifications do not know what was between"
+            )
+        self._tell(self.alarms.events)
+
+    def mark(self, t: float, text: str) -> None:
+        """Mark a moment on the time line of pages.
+
+        Args:
+            t: Its time [s].
+            text: What there is to say about it.
+        """
+        self._tell([Event(t, "mark", 0, 0, text)])
+
+    def _tell(self, events: Iterable[Event]) -> None:
+        self.events = sorted([*self.events, *events], key=lambda event: event.t)
+
+    def time_of(self, step: int) -> float:
+        """Time of the start of a step [s]."""
+        return self.start + step * self.dt
 
     @cached_property
     def results(self) -> dict[tuple[str, int | None], tuple[list[float], list[float]]]:

@@ -130,6 +130,10 @@ def test_a_run_that_was_killed_is_exported_as_far_as_it_goes(tussle, played, fol
         (("--mp4", "--from", "noon"), "--from: 'noon'"),
         (("--mp4", "--speed", "0"), "speed = 0.0 is not allowed"),
         (("--mcap", "--period", "0"), "--period 0 is not allowed"),
+        (("--mcap", "--spec", "always (count(all) > 1)"), "--spec is allowed with --html only"),
+        (("other", "--mcap"), "a second run is allowed with --html only"),
+        (("--html", "--over"), "a second run is required"),
+        (("--html", "--margin", "2"), "--margin is allowed with --spec only"),
     ],
 )
 def test_what_means_nothing_is_refused(tussle, folder, arguments, message):

@@ -35,6 +35,20 @@ def test_a_study_from_question_to_a_failing_game(tussle, folder):
     assert re.search(r"undone by +luck left", done.stdout)
     assert re.search(r"saved at t \[s\] +\d", done.stdout)
     tussle("run", folder / "out/failures/0-saved.xml", "--plugin-path", EXAMPLE / "hover.py")
+    (command,) = [line for line in done.stdout.splitlines() if line.startswith(" tussle replay")]
+    runs = shlex.split(command)[2:]
+    assert runs[:2] == ["out/failures/0", "out/failures/0-saved"]
+    assert (
+        json.loads((folder / runs[0] / "run.json").read_text())["worlds"][0]["state_hash"]
+        == listed[0]["state_hash"]
+    )
+    tussle("export", *runs, "--html", "both.html")
+    page = (folder / "both.html").read_text()
+    document = json.loads(re.search(r'id="document">(.*?)</script>', page)[1])
+    failed, saved = document["alarms"]
+    assert failed["failed"] is not None
+    assert saved["failed"] is None
+    assert failed["least"][-1] == listed[0]["robustness"]
     why = json.loads((folder / "out/result.json").read_text())["why"]
     assert (why["file"], why["saved"]) == ("failures/0.xml", "failures/0-saved.xml")
     assert {row["kind"] for row in why["rows"]} == {"luck", "entity"}

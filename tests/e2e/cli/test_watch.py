@@ -134,6 +134,21 @@ def test_a_specification_that_the_mission_does_not_have_is_refused(tussle, optio
     assert "http" not in done.stdout
 
 
+@pytest.mark.parametrize(
+    ("spec", "message"),
+    [
+        ("always (distance(prey, hunter) > 3 m)", "did you mean 'hunters'"),
+        ("always (max(prey.Boids.target) < 3)", "'prey.Boids.target' was not recorded"),
+        ("lost[1] < 3", "lost[1] is known at the end of a game"),
+    ],
+)
+def test_a_specification_that_a_recording_does_not_have_is_refused(tussle, spec, message):
+    tussle("run", "game.xml", "--out", "a", "--end", "1")
+    done = tussle("replay", "a", "--no-browser", "--spec", spec, code=1)
+    assert message in " ".join(done.stderr.split())
+    assert "http" not in done.stdout
+
+
 def test_other_hosts_are_warned_of(watching):
     with watching("view", "game.xml", "--paused", "--host", "0.0.0.0") as command:
         code, _, err = command.end()
@@ -147,8 +162,14 @@ def test_a_run_is_replayed_and_two_are_compared(tussle, watching):
     with watching("replay", "a", "--paused") as command:
         assert '"isPlaying":false' in page_of(command)
         assert command.end()[0] == 0
-    with watching("replay", "a", "b", "--over", "--pace", "3") as command:
+    told = ("--spec", "always (distance(prey, hunters) > 1 m)", "--margin", "500", "--mark", "0.5=half")
+    with watching("replay", "a", "b", "--over", "--pace", "3", *told) as command:
         page = page_of(command)
+        assert [each["near"] for each in document_of(page)["alarms"]] == [0.0, 0.0]
+        with urlopen(f"{command.url}/events", timeout=60) as answer:
+            events = json.loads(answer.read())
+        assert [0.5, "mark", 0, 0, "half"] in events
+        assert {text[:2] for _, kind, _, _, text in events if kind == "alarm"} == {"A:", "B:"}
         assert "they differ first at t = 0 s" in page
         assert '"warp":3.0' in page
         code, _, err = command.end()
@@ -165,6 +186,10 @@ def test_a_run_is_replayed_and_two_are_compared(tussle, watching):
         (("view", "game.xml", "--host", "192.0.2.1"), 1, "cannot be served at 192.0.2.1"),
         (("replay", "nowhere"), 4, "nowhere"),
         (("replay", "nowhere", "--over"), 2, "a second run is required"),
+        (("replay", "nowhere", "--margin", "2"), 2, "--margin is allowed with --spec only"),
+        (("replay", ".", "--mark", "soon"), 2, "--mark 'soon' is not allowed; it takes a time and a text"),
+        (("replay", ".", "--mark", "1="), 2, "--mark '1=' is not allowed"),
+        (("replay", ".", "--mark", "noon=lost"), 2, "--mark: 'noon'"),
     ],
 )
 def test_what_cannot_be_watched_is_told(tussle, arguments, code, told):
@@ -175,6 +200,11 @@ def test_what_cannot_be_watched_is_told(tussle, arguments, code, told):
 def recorded(folder):
     """What the run file in a directory says, which is there only when its recording was closed."""
     return json.loads((folder / "run.json").read_text())
+
+
+def document_of(page):
+    """What a page is told at once."""
+    return json.loads(re.search(r'id="document">(.*?)</script>', page)[1])
 
 
 def page_of(command):

@@ -12,7 +12,8 @@ from tussle.api import Autonomy, Field, Interaction, Message, Output, Param, Pub
 from tussle.errors import ParameterError
 from tussle.mission import read_mission
 from tussle.stock import ActuatorFault, FailingRadio, RandomAttrit, SingleIntegrator, Still
-from tussle.stress import Stress
+from tussle.stress import RecordedMonitor, Stress
+from tussle.view import Recording
 
 
 class Cruise(Autonomy):
@@ -101,6 +102,24 @@ def test_the_nearest_passing_game_is_a_mission(tmp_path):
     assert again.why(worst, directory=tmp_path, processes=1).entry() == why.entry()
     assert (tmp_path / "result.json").read_text() == text
     assert (tmp_path / "games.jsonl").read_text().count("\n") == n_games
+
+
+def test_both_games_are_recorded_with_what_the_specification_reads(tmp_path, monkeypatch):
+    text = "always (max(left.Cruise.velocity) < 3.5)"
+    for folder, most, stride in (("all", 2_000_000, 1), ("some", 60, 3)):
+        monkeypatch.setattr("tussle.stress.results.MAX_STATES", most)
+        study = Stress(gusty(), text)
+        for games in (100, 200):  # the second study finds the recordings of the first
+            worst = study.sample(games, directory=tmp_path / folder, processes=1).failures[0]
+            why = study.why(worst, moments=2, branches=10, directory=tmp_path / folder, processes=1)
+        for name, game in (("0", why.failed), ("0-saved", why.saved)):
+            run = Recording(tmp_path / folder / "failures" / name, plugin_files=(__file__,))
+            assert run.run.info["worlds"][0]["state_hash"] == game.state_hash
+            assert list(np.diff(run.steps)) == [stride] * (30 // stride)
+            known, _, robustness = RecordedMonitor(text, run).progress(0)
+            assert len(known) == 31
+            if stride == 1:
+                assert robustness == game.verdict.robustness
 
 
 def test_a_motor_that_is_stuck_at_a_known_time():

@@ -1,6 +1,8 @@
 """Specifications that are watched: the alarms are those of the robustness of the whole game, however it is wound, and change nothing."""
 
+import json
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,9 +13,11 @@ from tussle import Recorder, Simulation
 from tussle.errors import ParameterError
 from tussle.messages import CustomKeyPress
 from tussle.mission import read_mission
-from tussle.stress import Monitor, Specification
-from tussle.view import Live
+from tussle.stress import Monitor, RecordedMonitor, Specification
+from tussle.view import Live, Recording
+from tussle.view.page.compare import Comparison
 from tussle.view.page.document import event_rows
+from tussle.view.page.recorded import RecordedData, alarm_data
 from tussle.view.page.server import Page
 from tussle.view.series import CurveName
 
@@ -32,6 +36,7 @@ SPECS = [
 ]
 MARGIN = 2.5
 SEED = 5
+PLUGINS = Path(__file__).with_name("guarded_gate.py")
 
 
 def watched(mission, specs, seed=SEED, **options):
@@ -221,3 +226,62 @@ def test_what_cannot_be_computed_is_said_and_stops_nothing():
 )  # fmt: skip
 def test_the_unit_is_that_of_what_is_compared(text, unit):
     assert Specification.parse(text, guarded_gate()).unit == unit
+
+
+# -- of recorded games ------------------------------------------------------------------------------------------------------------
+
+
+def replayed(directory, seed=SEED):
+    """A recording of the game."""
+    with Simulation(guarded_gate(), seed) as alone, Recorder(alone, directory):
+        alone.run()
+    return Recording(directory, plugin_files=(PLUGINS,))
+
+
+def test_a_recorded_game_has_the_alarms_of_the_game(tmp_path):
+    specs = [text for text in SPECS if text != AT_END]
+    run = replayed(tmp_path / "run")
+    run.watch([RecordedMonitor(text, run) for text in specs], MARGIN)
+    alarms = sorted((e.t, e.kind, e.text) for e in run.events if e.kind in ("alarm", "failure"))
+    assert [alarm[1:] for alarm in alarms] == [alarm[1:] for alarm in expected_alarms(guarded_gate(), specs)]
+    courses = {each["text"]: each for each in alarm_data(run, 100)}
+    for text in specs:
+        verdict, present, _ = offline(guarded_gate(), text)
+        course = courses[text]
+        assert course["id"] == 100
+        assert course["t"] == [run.time_of(step) for step in verdict.steps]
+        assert course["least"] == [v if math.isfinite(v) else None for v in verdict.levels]
+        assert course["failed"] == (
+            None if verdict.first_below(0.0) is None else run.time_of(verdict.first_below(0.0))
+        )
+        curve = run.alarms.series.get(CurveName(text))
+        finite = np.isfinite(present)
+        assert (curve is None) == (not finite.any())
+        if curve is not None:
+            shown = [curve.at(step) for step in range(len(present))]
+            np.testing.assert_array_equal(shown, np.where(finite, present, np.nan))
+
+
+def test_two_recorded_games_have_a_curve_each_and_marks(tmp_path):
+    runs = [replayed(tmp_path / name, seed) for name, seed in (("a", SEED), ("b", SEED + 1))]
+    runs[0].mark(3.5, "lost from here on")
+    for run in runs:
+        run.watch([RecordedMonitor(NEAR, run)], MARGIN)
+    both = Comparison(*runs)
+    texts = {event.text for event in both.events if event.kind in ("alarm", "failure")}
+    assert texts == {f"A: {NEAR}", f"B: {NEAR}"}
+    assert [(e.t, e.text) for e in both.events if e.kind == "mark"] == [(3.5, "lost from here on")]
+    data = RecordedData(both, is_file=True)
+    assert [each["id"] for each in data.document()["alarms"]] == [0, both.id_shift]
+    curves = [each for each in json.loads(data.blob("curves")) if each["name"] == NEAR]
+    assert [each["id"] for each in curves] == [0, both.id_shift]
+    assert curves[0]["v"] != curves[1]["v"]
+
+
+def test_what_is_no_number_is_said_in_the_row_of_a_recorded_game(tmp_path):
+    run = replayed(tmp_path / "run")
+    text = "always (count(team 2) / count(team 2) > 0)"
+    run.watch([RecordedMonitor(text, run), RecordedMonitor(NEAR, run)])
+    lost, near = alarm_data(run, 0)
+    assert "is of no number (NaN)" in lost["note"]
+    assert not near["note"]

@@ -8,7 +8,8 @@ from pathlib import Path
 from tussle.view.export.whole_file import whole_file
 from tussle.view.page.assemble import page_html
 from tussle.view.page.chunks import ANGLE_ERROR, position_error
-from tussle.view.page.recorded import RecordedData
+from tussle.view.page.compare import Comparison
+from tussle.view.page.recorded import RecordedData, opening
 from tussle.view.recording import Recording
 
 
@@ -38,15 +39,19 @@ class HtmlExport:
 
 
 def write_html(
-    recording: Recording, path: str | Path, *, period: float | None = None, title: str | None = None
+    recording: Recording | Comparison,
+    path: str | Path,
+    *,
+    period: float | None = None,
+    title: str | None = None,
 ) -> HtmlExport:
-    """Write the page of a recorded run. The same run and options give the same bytes.
+    """Write the page of a recorded run, or of two. The same run and options give the same bytes.
 
     Positions are rounded to a centimetre or less, attitudes to some hundredths of a degree, health to 1/255 of its maximum in
     neighbouring frames; the page states the errors. All events are kept.
 
     Args:
-        recording: The run, complete or not.
+        recording: The run, complete or not; or two of them.
         path: The file; an existing one is replaced.
         period: Time between frames [s]; None keeps all frames.
         title: Its heading; by default the recording's name.
@@ -56,7 +61,7 @@ def write_html(
         ViewError: The run holds no states, or the file cannot be written.
     """
     data = RecordedData(recording, is_file=True, period=period, title=title)
-    document = data.document()
+    document = data.document(**opening(recording))
     blobs = {name: data.blob(name) or b"" for name in data.names}
     page = page_html(document, blobs).encode()
     with whole_file(Path(path)) as part:

@@ -274,17 +274,21 @@ class Comparison:
     def events(self) -> list[Event]:
         """Events of both, and where they part. Texts are of the run itself: a birth's is the name of its block."""
         shift = self.id_shift
-        found = [replace(e, text=f"A {e.text}" if e.kind == "birth" else e.text) for e in self.a.events]
+        found = [replace(e, text=_of_run("A", e)) for e in self.a.events]
         found += [
-            replace(
-                e, id=e.id and e.id + shift, other=e.other and e.other + shift,
-                text=f"B {e.text}" if e.kind == "birth" else e.text,
-            )
+            replace(e, id=e.id and e.id + shift, other=e.other and e.other + shift, text=_of_run("B", e))
             for e in self.b.events
-        ]  # fmt: skip
+        ]
         if self.difference is not None:
             found.append(Event(self.difference.t, "difference", 0, 0, "A and B part"))
         return sorted(found, key=lambda event: event.t)
+
+
+def _of_run(name: str, event: Event) -> str:
+    """Text of an event of one of two runs: with its name where it has nothing else of the run."""
+    if event.kind in ("alarm", "failure"):
+        return f"{name}: {event.text}"
+    return f"{name} {event.text}" if event.kind == "birth" else event.text
 
 
 class _Both:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import struct
 from collections.abc import Sequence
+from dataclasses import asdict
 from functools import cached_property
 from typing import Any
 
@@ -140,6 +141,7 @@ class RecordedData:
                 }
                 for column in game.columns.values()
             ],
+            "alarms": [each for run, _, shift in self._runs for each in alarm_data(run, shift)],
             **more,
         }
 
@@ -278,6 +280,13 @@ def chunk_bounds(counts: np.ndarray, n_states: int, least_frames: int) -> list[t
     return bounds
 
 
+def opening(game: Recording | Comparison) -> dict[str, Any]:
+    """Return the time at which a page begins, and what it says first: of two runs, where they differ."""
+    if isinstance(game, Recording) or game.difference is None:
+        return {"begins": float(game.t[0]), "lead": "" if isinstance(game, Recording) else game.lead}
+    return {"begins": game.difference.t, "lead": game.lead}
+
+
 def comparison_data(game: Comparison) -> list[dict[str, Any]]:
     """Return name, directory, teams and what their numbers have been raised by, of each of two runs."""
     return [
@@ -289,6 +298,11 @@ def comparison_data(game: Comparison) -> list[dict[str, Any]]:
         }
         for name, run, shift in (("A", game.a, 0), ("B", game.b, game.team_shift))
     ]
+
+
+def alarm_data(run: Recording, id_shift: int) -> list[dict[str, Any]]:
+    """Return what each specification came to in a run; `id` is that of its curve."""
+    return [] if run.alarms is None else [{**asdict(each), "id": id_shift} for each in run.alarms.courses]
 
 
 def game_facts(game: Recording | Comparison) -> list[tuple[str, str]]:

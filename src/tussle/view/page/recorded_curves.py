@@ -20,7 +20,7 @@ MAX_POINTS = 20_000
 
 
 def run_changes(run: Recording, team_shift: int = 0, id_shift: int = 0) -> list[Changes]:
-    """Return the entities left in each team, from the frames; those born and the captures made, from the events; recorded results.
+    """Return the entities left in each team, from the frames; those born and the captures made, from the events; results; robustness.
 
     Args:
         run: The run.
@@ -43,6 +43,8 @@ def run_changes(run: Recording, team_shift: int = 0, id_shift: int = 0) -> list[
     if any(by_team.values()):
         changes += [_counted(CurveName("captures", team), float(run.t[0]), t) for team, t in by_team.items()]
     changes += [Changes(CurveName(name, team), 0, *found) for (name, team), found in run.results.items()]
+    for quantity, series in run.alarms.series.items() if run.alarms else ():
+        changes.append(Changes(quantity, 0, list(map(run.time_of, series.steps)), series.values))
     return [_shifted(each, team_shift, id_shift) for each in changes]
 
 

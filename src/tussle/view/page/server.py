@@ -30,7 +30,7 @@ from tussle.view.page.compare import Comparison
 from tussle.view.page.document import game_document, scenery_blobs
 from tussle.view.page.failures import Failures
 from tussle.view.page.publisher import FramePublisher
-from tussle.view.page.recorded import RecordedData
+from tussle.view.page.recorded import RecordedData, opening
 from tussle.view.page.web_server import WebServer
 from tussle.view.recording import Recording
 
@@ -107,11 +107,7 @@ class Page:
             self._scenery = scenery_blobs(game.scenery)
         else:
             self._data = RecordedData(game, is_file=False, mission=mission, viewer=viewer)
-            begins = (
-                game.difference.t if isinstance(game, Comparison) and game.difference else float(game.t[0])
-            )
-            lead = game.lead if isinstance(game, Comparison) else ""
-            document = self._data.document(begins=begins, warp=warp, isPlaying=not is_paused, lead=lead)
+            document = self._data.document(**opening(game), warp=warp, isPlaying=not is_paused)
         document["notes"] = self.notes = [*notes, *document["notes"]]
         self._html = page_html(document)
         bound = bound_socket(self.host, port)

@@ -82,6 +82,7 @@ export function actionsOf(player) {
     smallerText: shift('text', -1),
     wire: change(() => { drawn.wire = true; }),
     solid: change(() => { drawn.wire = false; }),
+    plain: () => player.drawPlain(!player.picture.isPlain).then(() => showSettings(player)),
     grid: flip('grid'),
     links: flip('links'),
     theme: () => player.picture.nextTheme(),
@@ -138,6 +139,7 @@ export function listenToSettings(player) {
     });
   }
   fillViews(player.page.blocks);
+  field('plain-map').addEventListener('change', ({ target }) => player.drawPlain(/** @type {HTMLInputElement} */ (target).checked).then(() => showSettings(player)));
   listen('loop', 'change', ({ checked }) => { player.clock.isLooping = checked; });
   showSettings(player);
 }
@@ -155,8 +157,9 @@ function fillViews(blocks) {
   for (const node of /** @type {NodeListOf<HTMLElement>} */ (document.querySelectorAll('#settings .by-hand'))) node.hidden = true;
 }
 
-/** Bring the settings up to what keys have changed. @param {{ drawn: Drawn }} player */
-function showSettings({ drawn }) {
+/** Bring the settings up to what keys have changed. @param {{ drawn: Drawn, picture: { isPlain: boolean } }} player */
+function showSettings({ drawn, picture }) {
+  field('plain-map').checked = picture.isPlain;
   for (const name of CHECKS) field(name).checked = drawn[name];
   for (const name of NUMBERS) field(name).value = String(drawn[name]);
   field('trail').value = String(drawn.trail);

@@ -22,6 +22,8 @@ export class Camera {
     this.mode = 'overview';
     this.base = [0, 0, 0];
     this.heading = 0;
+    /** It looks straight down, as on a map: north, or where it follows to, is up. */
+    this.isPlain = false;
     this.goal = { at: [0, 0, 0], yaw: FIRST_YAW, pitch: FIRST_PITCH, zoom: Math.log(size) };
     this.now = structuredClone(this.goal);
     /** @type {{ goal: Camera['goal'], mode: Mode, base: number[], heading: number, chosen: number }[]} */
@@ -137,7 +139,8 @@ export class Camera {
 
   /** Right, up, and away from what is looked at, also straight from above. */
   axes(state = this.now) {
-    const yaw = state.yaw + this.heading;
+    const yaw = this.isPlain && this.mode !== 'behind' ? -Math.PI / 2 : state.yaw + this.heading;
+    if (this.isPlain) return { right: [-Math.sin(yaw), Math.cos(yaw), 0], up: [-Math.cos(yaw), -Math.sin(yaw), 0], away: [0, 0, 1] };
     const [level, height] = [Math.cos(state.pitch), Math.sin(state.pitch)];
     const away = [level * Math.cos(yaw), level * Math.sin(yaw), height];
     const right = [-Math.sin(yaw), Math.cos(yaw), 0];
@@ -155,6 +158,7 @@ export class Camera {
     const near = Math.max(0.02 * distance, 0.02);
     const far = 4 * (distance + this.size) + 100;
     const clip = perspective(minus(eye, anchor), right, up, away, FIELD_OF_VIEW, width / height, near, far);
+    if (this.isPlain) clip.set([0, 0, 0, distance].flatMap((w, i) => [clip[4 * i], clip[4 * i + 1], clip[4 * i + 2], w]));
     return { clip, eye, right, up, away, width, height, anchor, near, far, distance, ratio, perPixel: (2 * Math.tan(FIELD_OF_VIEW / 2)) / height };
   }
 
@@ -184,7 +188,7 @@ export class Camera {
     each((x, y, z) => {
       const across = Math.abs(right[0] * x + right[1] * y + right[2] * z - middle[0]) * wide;
       const upward = Math.abs(up[0] * x + up[1] * y + up[2] * z - middle[1]) * tall;
-      distance = Math.max(distance, Math.max(across, upward) + away[0] * x + away[1] * y + away[2] * z - middle[2]);
+      distance = Math.max(distance, Math.max(across, upward) + (this.isPlain ? 0 : away[0] * x + away[1] * y + away[2] * z - middle[2]));
     });
     const shift = [(room.right - room.left) * tangent * aspect * distance, (room.top - room.bottom) * tangent * distance, 0];
     const at = add(middle, shift);

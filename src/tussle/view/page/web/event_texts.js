@@ -31,6 +31,9 @@ export const EVENT_TEXTS = {
   "flag": [
     "{id} {text}"
   ],
+  "mark": [
+    "{text}"
+  ],
   "end": [
     "the game ended: {text}"
   ]

@@ -8,9 +8,9 @@ import { lastWhere } from './ordered.js';
 import { Clock } from './timeline.js';
 
 /** Colours that are told apart with every kind of colour vision; the shapes tell them apart as well. @type {Record<string, string>} */
-export const KINDS = { capture: '#e8743b', collision: '#d9ae1f', flag: '#4aa3df', birth: '#2fb38a', death: '#b59ad6', alarm: '#f0c04a', failure: '#e5534b', end: '#93a1b0', difference: '#e05a9c' };
-/** Births and deaths are marked below a line, all others above it. */
-const BELOW = ['birth', 'death'];
+export const KINDS = { capture: '#e8743b', collision: '#d9ae1f', flag: '#4aa3df', birth: '#2fb38a', death: '#b59ad6', alarm: '#f0c04a', failure: '#e5534b', mark: '#8f7cf7', end: '#93a1b0', difference: '#e05a9c' };
+/** What is marked below a line, all others above it. */
+const BELOW = ['birth', 'death', 'mark'];
 /** Pixels within which a mark is pointed at, and half the knob of the slider. */
 const [NEAR, KNOB] = [6, 7.5];
 
@@ -46,6 +46,13 @@ export class EventLine {
     return KNOB + (horizon > start ? ((t - start) / (horizon - start)) * (this.canvas.clientWidth - 2 * KNOB) : 0);
   }
 
+  /** Time at a pixel of the window, within the game. @param {number} clientX */
+  timeAt(clientX) {
+    const { start, horizon } = this.layer;
+    const { left, width } = this.canvas.getBoundingClientRect();
+    return start + between((clientX - left - KNOB) / (width - 2 * KNOB), 0, 1) * (horizon - start);
+  }
+
   /** Draw all marks: as many as fall on two pixels are one mark, the higher the more they are. */
   draw() {
     const { marked, start, horizon } = this.layer;
@@ -56,7 +63,8 @@ export class EventLine {
       const key = `${Math.round(this.x(t) / 2)} ${kind}`;
       bins.set(key, (bins.get(key) || 0) + 1);
     }
-    for (const [key, count] of bins) {
+    const isMark = (/** @type {string} */ key) => Number(key.endsWith('mark'));
+    for (const [key, count] of [...bins].sort(([a], [b]) => isMark(a) - isMark(b))) {
       const [bin, kind] = key.split(' ');
       pen.fillStyle = KINDS[kind] || KINDS.end;
       pen.fill(markOf(kind, 2 * Number(bin), Math.min(13, 5 + 2.5 * Math.log2(count))));
@@ -119,6 +127,7 @@ function markOf(kind, x, size) {
   if (kind === 'flag') return new Path2D(`M${x - 0.8} 18V${top - 3}L${x + 7} ${top}L${x + 0.8} ${top + 3}V18Z`);
   if (kind === 'birth') return new Path2D(`M${x} 20L${x + 3.6} ${bottom}L${x - 3.6} ${bottom}Z`);
   if (kind === 'death') return new Path2D(`M${x - 3.6} 20L${x + 3.6} 20L${x} ${bottom}Z`);
+  if (kind === 'mark') return new Path2D(`M${x} 19L${x + 4.5} 23.5L${x} 28L${x - 4.5} 23.5Z`);
   const path = new Path2D();
   if (kind === 'alarm' || kind === 'failure') return new Path2D(`M${x - 4} 4H${x + 4}L${x + 1.2} 24H${x - 1.2}Z`);
   if (kind === 'end' || kind === 'difference') {

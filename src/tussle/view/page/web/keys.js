@@ -29,6 +29,7 @@ const KEYS = [
     [['l'], 'labels', 'labels'],
     [['n', 'N'], 'larger, smaller labels', 'largerText', 'smallerText'],
     [['w', 's'], 'wireframe, solid', 'wire', 'solid'],
+    [['2'], 'plain map, 3D', 'plain'],
     [['g'], 'grid and axes', 'grid'],
     [['x'], 'links between entities in range', 'links'],
     [['k'], 'dark, light', 'theme'],

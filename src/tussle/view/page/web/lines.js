@@ -2,6 +2,7 @@
 /** @import { Colour, Vector, View } from './types' */
 
 import { minus } from './geometry.js';
+import { PlainRenderer } from './plain.js';
 import { Instances, Renderer } from './renderer.js';
 
 /** Of a point of a line: place, colour, and in a byte its age from 0 to 127 and whether a line goes on from it to the next. */
@@ -9,7 +10,7 @@ const POINT_BYTES = 16;
 
 /** Points of lines; each goes on to the next one, if it says so. */
 export class Lines extends Instances {
-  /** @param {Renderer} renderer */
+  /** @param {Renderer | PlainRenderer} renderer */
   constructor(renderer) {
     super(renderer, POINT_BYTES);
     /** @type {Vector} */
@@ -37,6 +38,10 @@ export class Lines extends Instances {
   /** @param {View} view @param {number} width pixels of the screen @param {number} opacity */
   draw(view, width, opacity) {
     if (this.n < 2) return;
+    if (this.renderer instanceof PlainRenderer) {
+      this.renderer.drawLines(this, view, width, opacity);
+      return;
+    }
     this.renderer.use('line', {
       clip: view.clip, offset: minus(this.anchor, view.anchor), viewport: [view.width, view.height], width: width * view.ratio, near: view.near, opacity,
     });

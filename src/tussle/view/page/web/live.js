@@ -39,6 +39,11 @@ export class Live extends Layer {
     return this.status?.isOver ? this.end : Math.max(this.end, this.page.endTime ?? this.end);
   }
 
+  /** State of each specification. */
+  alarmsAt() {
+    return this.status.alarms;
+  }
+
   /** Take the newest frame. @param {{ epoch: number }} header @param {Uint8Array} bytes */
   takeFrame({ epoch }, bytes) {
     const chunk = new Chunk(bytes, this.page);

@@ -13,13 +13,13 @@ function sorry(text) {
 
 /** What others may see of the player; nothing of it can be changed. @param {Player} player */
 function publish(player) {
-  const { page, layer, camera, picture } = player;
+  const { page, layer, camera } = player;
   const state = {
     get isReady() { return player.isReady; },
     get t() { return player.clock.t; },
     get frame() { return layer.shown.frame; },
     /** Whether the page shows what is true now, and nothing moves by itself. */
-    get isDrawn() { return !player.isChanged && layer.isSettled && player.drawnTime === player.clock.t && (player.clock.isPlaying || !picture.isHalf); },
+    get isDrawn() { return !player.isChanged && layer.isSettled && player.drawnTime === player.clock.t && (player.clock.isPlaying || !player.picture.isHalf); },
     get nFrames() { return page.nFrames; },
     get isPlaying() { return player.clock.isPlaying; },
     get speed() { return player.clock.speed; },
@@ -27,11 +27,12 @@ function publish(player) {
     /** Frames that have been drawn. */
     get nDrawn() { return player.nDrawn; },
     get mode() { return camera.mode; },
+    get isPlain() { return player.picture.isPlain; },
     get camera() {
       const { target, distance, now, heading } = camera;
       return { target, distance, yaw: now.yaw + heading, pitch: now.pitch };
     },
-    get drawn() { return { ...player.drawn, theme: picture.theme, hidden: [...player.hidden] }; },
+    get drawn() { return { ...player.drawn, theme: player.picture.theme, hidden: [...player.hidden] }; },
     get ids() { return [...layer.shown.ids()]; },
     get events() { return structuredClone(layer.marked); },
     get status() { return 'status' in layer ? structuredClone(layer.status) : null; },
@@ -41,9 +42,9 @@ function publish(player) {
       return t.map((time, i) => [time, v[i]]);
     },
     /** Texts in the picture. */
-    get texts() { return [...picture.overlay.texts]; },
-    get shapes() { return picture.shapes.header.parts.map(({ kind, n }) => [kind, n]); },
-    get trailPoints() { return picture.trails.n; },
+    get texts() { return [...player.picture.overlay.texts]; },
+    get shapes() { return player.picture.shapes.header.parts.map(({ kind, n }) => [kind, n]); },
+    get trailPoints() { return player.picture.trails.n; },
     /** Place of an entity [m], and its attitude (w, x, y, z); null where it is not there. @param {number} id */
     stateOf(id) {
       const slot = layer.slotOf(id);
@@ -52,8 +53,8 @@ function publish(player) {
     /** Pixel of an entity in the window; null where it is not in view. @param {number} id */
     pixelOf(id) {
       const place = layer.shown.placeOf(id);
-      const pixel = place && pixelOf(picture.view, place);
-      return pixel && [pixel[0] / picture.ratio, pixel[1] / picture.ratio];
+      const pixel = place && pixelOf(player.picture.view, place);
+      return pixel && [pixel[0] / player.picture.ratio, pixel[1] / player.picture.ratio];
     },
   };
   Object.defineProperty(window, 'player', { value: Object.freeze(state) });

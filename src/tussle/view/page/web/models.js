@@ -2,6 +2,7 @@
 /** @import { Colour, Mesh, PageData, Vector, View } from './types' */
 
 import { add, cross, dot, minus, norm, scaled, unit } from './geometry.js';
+import { PlainRenderer, silhouette } from './plain.js';
 import { Instances, Renderer, Table, wordsFor } from './renderer.js';
 import { Layer } from './layer.js';
 
@@ -74,19 +75,28 @@ export function coarse({ vertices, faces }) {
 
 /** One mesh and the instances of it that are drawn. */
 export class Model extends Instances {
-  /** @param {Renderer} renderer @param {Mesh} mesh */
+  /** @param {Renderer | PlainRenderer} renderer @param {Mesh} mesh */
   constructor(renderer, mesh) {
     super(renderer, INSTANCE_BYTES);
+    this.mesh = mesh;
+    /** What it covers on a plain map, level and heading east. @type {Path2D | null} */
+    this.levelShape = null;
+    if (renderer instanceof PlainRenderer) {
+      this.levelShape = silhouette(mesh, LEVEL);
+      /** Distance of its farthest corner from its origin. */
+      this.reach = mesh.vertices.reduce((most, _, i, all) => (i % 3 ? most : Math.max(most, norm(all.slice(i, i + 3)))), 0);
+      return;
+    }
     const { corners, lines } = prepared(mesh);
-    this.solid = this.shape(corners);
-    this.wire = this.shape(lines);
+    this.solid = this.shape(renderer, corners);
+    this.wire = this.shape(renderer, lines);
   }
 
-  /** @param {Float32Array} corners place and normal of each, eight numbers */
-  shape(corners) {
+  /** @param {Renderer} renderer @param {Float32Array} corners place and normal of each, eight numbers */
+  shape(renderer, corners) {
     const words = new Uint32Array(wordsFor(corners.length));
     new Float32Array(words.buffer).set(corners);
-    const table = new Table(this.renderer);
+    const table = new Table(renderer);
     table.upload(words);
     return { table, n: corners.length / 8 };
   }
@@ -108,6 +118,10 @@ export class Model extends Instances {
   /** @param {View} view @param {Record<string, number>} look values of the program beside the view; `least` is in pixels */
   draw(view, { scale = 1, least = 0, opacity = 1, flatness = 0, bright = 1 }, isWire = false) {
     if (!this.n) return;
+    if (this.renderer instanceof PlainRenderer) {
+      this.renderer.drawModel(this, view, { scale, least, opacity });
+      return;
+    }
     const { gl } = this.renderer;
     const { table, n } = isWire ? this.wire : this.solid;
     this.renderer.use('model', { corners: n, clip: view.clip, scale, least: least * view.ratio * view.perPixel, opacity, flatness: isWire ? 1 : flatness, bright });
@@ -129,7 +143,7 @@ export class Model extends Instances {
 
 /** All entities of a game. */
 export class Entities {
-  /** @param {Renderer} renderer @param {Layer} layer @param {PageData} page */
+  /** @param {Renderer | PlainRenderer} renderer @param {Layer} layer @param {PageData} page */
   constructor(renderer, layer, { blocks, models }) {
     this.layer = layer;
     const found = new Map(blocks.map(({ model }) => [model, [models[model], coarse(models[model])].map((mesh) => new Model(renderer, mesh))]));
@@ -145,7 +159,7 @@ export class Entities {
     const { anchor, eye, away } = view;
     for (const model of this.models) model.n = 0;
     let nCorners = 0;
-    for (let i = 0; i < shown.n; i++) nCorners += this.modelsOf[shown.block[i]][0].solid.n;
+    for (let i = 0; i < shown.n; i++) nCorners += this.modelsOf[shown.block[i]][0].solid?.n ?? 0;
     /** Distance from the eye at which they are small. */
     const farFrom = this.sizeOf.map((lengths) => (nCorners > MAX_CORNERS ? (scale * Math.max(...lengths)) / (SMALL * view.ratio * view.perPixel) : Infinity));
     for (let i = 0; i < shown.n; i++) {

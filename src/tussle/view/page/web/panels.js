@@ -157,7 +157,8 @@ export class Panels {
     /** Names, teams and ids of the worlds and teams that have results. @type {[string, number | null, number][]} */
     const owners = [...(page.runs || [{ name: '' }]).map(({ name }, i) => /** @type {[string, null, number]} */ ([name, null, i && page.idShift])),
       ...page.teams.map(({ id, name }) => /** @type {[string, number, number]} */ ([name || `team ${id}`, id, 0]))];
-    return results.filter((name) => !name.endsWith('.score')).map((name) => [
+    const specifications = (page.alarms || []).map(({ text }) => text);
+    return results.filter((name) => !name.endsWith('.score') && !specifications.includes(name)).map((name) => [
       name.replace('.', ' ').replaceAll('_', ' '),
       owners.filter(([, team, id]) => series.has(name, team, id)).map(([owner, team, id]) => `${owner} ${amount(series.of(name, team, id).at(t))}`.trim()).join(', '),
     ]);

@@ -6,6 +6,7 @@ import { byId, element, length, parseColour, say, styled } from './formatting.js
 import { add, between, minus, norm, scaled } from './geometry.js';
 import { geodeticOf, sidesOf } from './geodesy.js';
 import { pixelOf, placeBehind } from './camera.js';
+import { PlainRenderer } from './plain.js';
 import { Renderer } from './renderer.js';
 import { Entities } from './models.js';
 import { Trails, TRAIL_LENGTHS } from './trails.js';
@@ -20,11 +21,13 @@ const MIN_SIZE = 18;
 const MAX_DISTANCE = 5e4;
 
 export class Picture {
-  /** @param {Player} player */
-  constructor(player) {
+  /** @param {Player} player @param {boolean} isPlain a map, seen from above, that needs no WebGL */
+  constructor(player, isPlain) {
     const { page, layer, gl } = player;
     this.player = player;
-    const renderer = new Renderer(gl);
+    const renderer = isPlain ? new PlainRenderer(byId('plain', HTMLCanvasElement), page.models.sphere) : new Renderer(gl);
+    this.renderer = renderer;
+    this.canvas = renderer.canvas;
     this.scenery = new Scenery(renderer, page);
     this.shapes = new Shapes(renderer, page.models.sphere);
     this.entities = new Entities(renderer, layer, page);
@@ -37,12 +40,12 @@ export class Picture {
     this.view = null;
     /** Pixel of the window that the pointer is at. @type {number[] | null} */
     this.pointer = null;
-    this.setTheme(page.scenery.background ? 'mission' : window.matchMedia('(prefers-color-scheme: light)').matches ? 'light' : 'dark');
+    this.setTheme(player.picture ? player.picture.theme : page.scenery.background ? 'mission' : window.matchMedia('(prefers-color-scheme: light)').matches ? 'light' : 'dark');
   }
 
   /** Fit it to the window. @param {boolean} isHalf half as many pixels each way, where they are slow */
   resize(isHalf = this.isHalf) {
-    const { canvas } = this.player;
+    const { canvas } = this;
     this.isHalf = isHalf;
     this.ratio = Math.min(window.devicePixelRatio || 1, 2) * (isHalf ? 0.5 : 1);
     canvas.width = Math.max(1, Math.round(canvas.clientWidth * this.ratio));
@@ -67,6 +70,10 @@ export class Picture {
   nextTheme() {
     const themes = ['dark', 'light', ...(this.player.page.scenery.background ? ['mission'] : [])];
     this.setTheme(themes[(themes.indexOf(this.theme) + 1) % themes.length]);
+  }
+
+  get isPlain() {
+    return this.renderer instanceof PlainRenderer;
   }
 
   // -- where things are -----------------------------------------------------------------------------------------------------------
@@ -111,6 +118,7 @@ export class Picture {
   /** The place of the ground at a pixel of the window; null where there is none. @param {number} x @param {number} y */
   groundAt(x, y) {
     const { eye } = this.view;
+    if (this.isPlain) return [...this.placeAt(x, y).slice(0, 2), this.scenery.data.ground];
     const way = minus(this.placeAt(x, y), eye);
     const share = (this.scenery.data.ground - eye[2]) / way[2];
     return share > 0 && share < Infinity ? add(eye, scaled(way, share)) : null;
@@ -133,40 +141,35 @@ export class Picture {
   // -- drawing --------------------------------------------------------------------------------------------------------------------
 
   draw() {
-    const { gl, camera, canvas, drawn, hidden, chosen } = this.player;
-    const { scenery } = this;
+    const { camera, drawn, hidden, chosen } = this.player;
+    const { canvas, renderer, scenery } = this;
     const isFar = norm(minus(camera.target, scenery.anchor)) > MAX_DISTANCE;
     const anchor = isFar ? camera.target.map((c) => 1e4 * Math.round(c / 1e4)) : scenery.anchor;
     const view = camera.view(canvas.width, canvas.height, this.ratio, anchor);
     this.view = view;
-    gl.viewport(0, 0, canvas.width, canvas.height);
-    gl.clear(gl.DEPTH_BUFFER_BIT);
-    gl.disable(gl.BLEND);
+    renderer.begin();
     scenery.drawSky(this.colours);
     scenery.drawTerrain(view, this.look, drawn.grid);
+    if (drawn.shapes) this.shapes.place(anchor);
+    if (this.isPlain) this.drawThrough(view);
     this.entities.place(view, this.scale, hidden, chosen);
     this.entities.draw(view, { scale: this.scale, least: drawn.least ? MIN_SIZE : 0, bright: this.look.bright }, drawn.wire);
-    if (drawn.shapes) {
-      this.shapes.place(anchor);
-      this.shapes.draw(view, false);
-    }
-    this.drawThrough(view);
+    if (drawn.shapes) this.shapes.draw(view, false);
+    if (!this.isPlain) this.drawThrough(view);
     this.drawOver(view);
   }
 
   /** Draw what is seen through. @param {View} view */
   drawThrough(view) {
-    const { gl, drawn, hidden, chosen, camera } = this.player;
-    gl.enable(gl.BLEND);
-    gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
-    gl.depthMask(false);
+    const { drawn, hidden, chosen, camera } = this.player;
+    this.renderer.seeThrough(true);
     if (drawn.grid) this.scenery.drawGround(view, this.colours, camera.target);
     this.trails.place(view.anchor, TRAIL_LENGTHS[drawn.trail], hidden, chosen);
     this.trails.draw(view, 1.4, this.look.trail);
     if (drawn.rings || drawn.cones || drawn.links) this.reach.draw(view, this.slots(), drawn);
     if (drawn.shapes) this.shapes.draw(view, true);
     if (drawn.regions) this.scenery.drawRegions(view);
-    gl.depthMask(true);
+    this.renderer.seeThrough(false);
   }
 
   /** Draw texts, rings and flashes. @param {View} view */
@@ -193,7 +196,7 @@ export class Picture {
 
   /** Hand the picture, without the panels, to the reader as a PNG file. */
   save() {
-    const { canvas, page, clock } = this.player;
+    const { canvas, player: { page, clock } } = this;
     this.resize(false);
     const picture = element('canvas');
     [picture.width, picture.height] = [canvas.width, canvas.height];

@@ -24,6 +24,8 @@ import { actionsOf, listenToSettings } from './actions.js';
 
 /** As far as it is looked back for the longest trails [s]. */
 const LONGEST_LOOK = 1e8;
+/** Frames per second below which 3D is slow. */
+const MIN_RATE = 8;
 /** Time over which drawn frames are counted [ms]. */
 const RATE_SPAN = 4000;
 /** Least time between two looks back for the trails [ms]. */
@@ -42,7 +44,7 @@ export class Player {
     this.isSlow = isDrawnSlowly();
     document.body.dataset.drawn = this.isSlow ? 'slowly' : '';
     this.gl = this.canvas.getContext('webgl2', { antialias: !this.isSlow, alpha: false, powerPreference: 'high-performance' });
-    if (!this.gl) throw new Sorry('This page draws with WebGL 2, which this browser does not have or has turned off.');
+    if (!this.gl && !byId('plain', HTMLCanvasElement).getContext('2d', { alpha: false })) throw new Sorry('This page draws with WebGL 2 or on a 2D canvas, and this browser has neither.');
     if (!window.DecompressionStream) throw new Sorry('This page unpacks its data with DecompressionStream, which this browser is too old to have.');
     const size = Math.max(norm(minus(page.scenery.high, page.scenery.low)), 1);
     const reach = Number((page.reach || 0.05 * size).toPrecision(3));
@@ -79,7 +81,12 @@ export class Player {
     /** @type {number[]} */
     this.drawTimes = [];
     this.camera = new Camera(size);
-    this.picture = new Picture(this);
+    /** Of 3D and of the plain map, each from when it is first shown. @type {Picture[]} */
+    this.pictures = [];
+    this.camera.isPlain = !this.gl;
+    byId('plain').hidden = Boolean(this.gl);
+    this.picture = this.pictures[Number(!this.gl)] = new Picture(this, !this.gl);
+    this.isMeasured = !this.gl;
     this.viewpoint = new Viewpoint(this);
   }
 
@@ -104,7 +111,8 @@ export class Player {
     this.viewpoint.open();
     this.lookBack();
     this.isReady = true;
-    const hints = [this.isSlow && 'Drawn without a graphics card: coarser while it moves', window.matchMedia('(hover: hover)').matches && 'h shows the keys'];
+    const slow = this.gl ? 'Drawn without a graphics card: coarser while it moves; 2 draws a plain map' : 'A plain map: this browser has no WebGL, which 3D needs';
+    const hints = [this.isSlow && slow, window.matchMedia('(hover: hover)').matches && 'h shows the keys'];
     this.say(hints.filter(Boolean).join(' · '));
     this.last = performance.now();
     requestAnimationFrame((now) => this.tick(now));
@@ -192,7 +200,9 @@ export class Player {
     for (const node of [document.body, byId('head'), byId('bar')]) sizes.observe(node);
     this.canvas.addEventListener('webglcontextlost', (event) => {
       event.preventDefault();
-      this.sorry('The graphics card has dropped this page. Loading it again brings it back.');
+      this.gl = null;
+      this.drawPlain(true);
+      this.say('A plain map: the graphics card has dropped this page. Loading it again brings 3D back');
     });
   }
 
@@ -204,6 +214,41 @@ export class Player {
     style.setProperty('--head', `${byId('head').offsetHeight}px`);
     this.events.draw();
     this.look();
+  }
+
+  /** Draw as a plain map, or in 3D. @param {boolean} isPlain */
+  async drawPlain(isPlain) {
+    if (!isPlain && !this.gl) return this.say('3D needs WebGL 2, which this browser does not have or has turned off');
+    const before = this.picture;
+    if (before.isPlain === isPlain) return undefined;
+    let next = this.pictures[Number(isPlain)];
+    if (!next) {
+      next = this.pictures[Number(isPlain)] = new Picture(this, isPlain);
+      await next.scenery.read(this.source);
+    }
+    next.shapes.take(before.shapes.header, new Uint8Array(before.shapes.data.buffer));
+    if (next.theme !== before.theme) next.setTheme(before.theme);
+    this.picture = next;
+    this.camera.isPlain = isPlain;
+    byId('plain').hidden = !isPlain;
+    this.resize();
+    return undefined;
+  }
+
+  /** Draw as a plain map where 3D is slow. The quickest of three pictures counts, and reading a pixel waits for it. */
+  measure() {
+    this.isMeasured = true;
+    this.picture.resize(this.isSlow);
+    const times = [0, 1, 2].map(() => {
+      const begin = performance.now();
+      this.picture.draw();
+      this.gl.readPixels(0, 0, 1, 1, this.gl.RGBA, this.gl.UNSIGNED_BYTE, new Uint8Array(4));
+      return performance.now() - begin;
+    });
+    const rate = 1000 / Math.min(...times);
+    if (rate >= MIN_RATE) return;
+    this.drawPlain(true);
+    this.say(`A plain map: this browser draws 3D at ${rate.toPrecision(2)} frames/s (2 switches)`);
   }
 
   /** Draw with half the pixels each way, or with all again. @param {boolean} isHalf */
@@ -232,7 +277,8 @@ export class Player {
     if (this.isShown) {
       this.viewpoint.update();
       const isMoving = this.camera.step(seconds, this.isCalm);
-      const isHalf = this.isSlow && (isMoving || this.clock.isPlaying);
+      if (!this.isMeasured) this.measure();
+      const isHalf = this.isSlow && !this.picture.isPlain && (isMoving || this.clock.isPlaying);
       if (isHalf !== this.picture.isHalf) this.refine(isHalf);
       if (this.isChanged || isMoving) {
         this.isChanged = isMoving;

@@ -7,7 +7,7 @@ import { Live } from './live.js';
 import { OF_TEAMS, steps } from './series.js';
 
 /** Colours of entities in one plot, told apart with every kind of colour vision. */
-const COLOURS = ['#4aa3df', '#e8743b', '#2fb38a', '#d9ae1f', '#b59ad6', '#e05a9c'];
+export const COLOURS = ['#4aa3df', '#e8743b', '#2fb38a', '#d9ae1f', '#b59ad6', '#e05a9c'];
 /** Lines of one plot. */
 const MAX_LINES = 12;
 /** Titles of quantities of teams. @type {Record<string, string>} */

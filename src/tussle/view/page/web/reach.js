@@ -5,6 +5,7 @@ import { add, between, minus, rotated, turned } from './geometry.js';
 import { Layer } from './layer.js';
 import { circle, Lines } from './lines.js';
 import { LEVEL, Model } from './models.js';
+import { PlainRenderer } from './plain.js';
 import { Renderer } from './renderer.js';
 
 /** Lines between entities; of more, the shortest are drawn. */
@@ -14,7 +15,7 @@ const MAX_PAIRS = 400000;
 const SIDES = 40;
 
 export class Reach {
-  /** @param {Renderer} renderer @param {Layer} layer */
+  /** @param {Renderer | PlainRenderer} renderer @param {Layer} layer */
   constructor(renderer, layer) {
     this.renderer = renderer;
     this.layer = layer;

@@ -1,5 +1,5 @@
 // A recorded run, whose chunks are unpacked when they are first needed.
-/** @import { Change, EventRow, PageData, Sample, Section, ShapesHeader, Source } from './types' */
+/** @import { Change, EventRow, PageData, Sample, Section, ShapesHeader, Source, SpecificationState } from './types' */
 
 import { between } from './geometry.js';
 import { Reader, readMessage } from './packing.js';
@@ -168,6 +168,18 @@ export class Recorded extends Layer {
   sectionsOf(id) {
     const { frame } = this.shown;
     return this.columnsOf(this.chunkOf(frame))?.sections(frame, id) || [];
+  }
+
+  /** State of each specification at a time. @param {number} t @returns {SpecificationState[]} */
+  alarmsAt(t) {
+    const now = t + this.slack;
+    return this.page.alarms.map(({ text, unit, id, near, failed, t: times, least, note }) => {
+      const last = lastNotAfter(times, now);
+      const since = [failed, near].find((time) => time !== null && time <= now) ?? null;
+      const state = note ? 'unknown' : since === null ? (last < 0 ? 'open' : 'holds') : since === failed ? 'failed' : 'near';
+      const value = this.series.of(text, null, id).at(now);
+      return { text, unit, id, state, now: Number.isNaN(value) ? null : value, ended: /** @type {null} */ (null), least: least[last] ?? null, reached: times[last] ?? null, since, note };
+    });
   }
 
   /** @param {number} t */

@@ -1,6 +1,7 @@
 // WebGL 2: programs, buffers, and tables of instances.
 /** @import { Vector } from './types' */
 
+import { PlainRenderer } from './plain.js';
 import {
   GROUND_CORNERS, GROUND_PAINT, LINE_CORNERS, LINE_PAINT, MODEL_CORNERS, MODEL_PAINT, SKY_CORNERS, SKY_PAINT, TERRAIN_CORNERS, TERRAIN_PAINT,
   PART_CORNERS, PART_PAINT,
@@ -17,25 +18,45 @@ const TABLE_WIDTH = 1024;
 /** What draws WebGL without a graphics card calls itself so. */
 const SOFTWARE = /swiftshader|llvmpipe|softpipe|software|basic render/i;
 
-/** Whether this browser draws without a graphics card. */
+/** Whether this browser draws without a graphics card, or without WebGL. */
 export function isDrawnSlowly() {
   const gl = document.createElement('canvas').getContext('webgl2');
   const names = gl?.getExtension('WEBGL_debug_renderer_info');
   const isSlow = SOFTWARE.test(String(gl?.getParameter(names ? names.UNMASKED_RENDERER_WEBGL : gl.RENDERER)));
   gl?.getExtension('WEBGL_lose_context')?.loseContext();
-  return isSlow;
+  return isSlow || !gl;
 }
+
+/** The picture of a JPEG file. @param {Uint8Array<ArrayBuffer>} file */
+export const imageOf = (file) => createImageBitmap(new Blob([file], { type: 'image/jpeg' }));
 
 /** The canvas with its programs. */
 export class Renderer {
   /** @param {WebGL2RenderingContext} gl */
   constructor(gl) {
     this.gl = gl;
+    this.canvas = /** @type {HTMLCanvasElement} */ (gl.canvas);
     this.programs = Object.fromEntries(Object.entries(PROGRAMS).map(([name, sources]) => [name, this.program(sources)]));
     this.square = this.array(() => {
       this.buffer(new Float32Array([-1, -1, 1, -1, -1, 1, 1, 1]));
       this.attribute(0, 2, gl.FLOAT, 0, 0);
     });
+  }
+
+  /** Begin a picture. */
+  begin() {
+    const { gl, canvas } = this;
+    gl.viewport(0, 0, canvas.width, canvas.height);
+    gl.clear(gl.DEPTH_BUFFER_BIT);
+    gl.disable(gl.BLEND);
+  }
+
+  /** Draw what is seen through, or what is not. @param {boolean} isSeenThrough */
+  seeThrough(isSeenThrough) {
+    const { gl } = this;
+    if (isSeenThrough) gl.enable(gl.BLEND);
+    gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
+    gl.depthMask(!isSeenThrough);
   }
 
   /** Compile a program and find its uniforms. @param {string[]} sources */
@@ -106,7 +127,7 @@ export class Renderer {
   /** A texture of a JPEG file; white without one. @param {Uint8Array<ArrayBuffer> | null} file */
   async texture(file) {
     const { gl } = this;
-    const image = file && (await createImageBitmap(new Blob([file], { type: 'image/jpeg' })));
+    const image = file && (await imageOf(file));
     const texture = gl.createTexture();
     gl.bindTexture(gl.TEXTURE_2D, texture);
     if (image) gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA, gl.RGBA, gl.UNSIGNED_BYTE, image);
@@ -152,11 +173,11 @@ export const wordsFor = (n) => 4 * TABLE_WIDTH * Math.max(1, Math.ceil(n / (4 * 
 
 /** Rows of numbers that are filled anew for each picture. */
 export class Instances {
-  /** @param {Renderer} renderer @param {number} rowBytes a multiple of 16 */
+  /** @param {Renderer | PlainRenderer} renderer @param {number} rowBytes a multiple of 16 */
   constructor(renderer, rowBytes) {
     this.renderer = renderer;
     this.rowBytes = rowBytes;
-    this.table = new Table(renderer);
+    this.table = renderer instanceof PlainRenderer ? null : new Table(renderer);
     this.n = 0;
     this.resize(64);
   }
@@ -182,7 +203,7 @@ export class Instances {
 
   /** Hand the rows to the graphics card. */
   upload() {
-    this.table.upload(this.words, (this.n * this.rowBytes) / 16);
+    this.table?.upload(this.words, (this.n * this.rowBytes) / 16);
   }
 
   /** Draw so many vertices. @param {number} kind @param {number} n */

@@ -5,7 +5,8 @@ import { add, between, minus, scaled, unit } from './geometry.js';
 import { Reader } from './packing.js';
 import { circle, Lines } from './lines.js';
 import { Model } from './models.js';
-import { Renderer } from './renderer.js';
+import { PlainRenderer, PlainTerrain } from './plain.js';
+import { imageOf, Renderer } from './renderer.js';
 
 /** @type {[string, number[]][]} */
 export const AXES = [['E', [226, 106, 92]], ['N', [92, 176, 112]], ['U', [94, 150, 232]]];
@@ -15,7 +16,7 @@ const MIN_CELL = 14;
 const CIRCLE = 64;
 
 export class Scenery {
-  /** @param {Renderer} renderer @param {PageData} page */
+  /** @param {Renderer | PlainRenderer} renderer @param {PageData} page */
   constructor(renderer, { scenery, teams, models }) {
     this.renderer = renderer;
     this.data = scenery;
@@ -32,7 +33,7 @@ export class Scenery {
       const colour = colourOf(team);
       for (let i = 0; i + 6 <= outline.length; i += 6) this.outlines.segment(outline.slice(i, i + 3), outline.slice(i + 3, i + 6), colour);
       const model = new Model(renderer, { vertices: vertices.map((v, i) => v - this.anchor[i % 3]), faces });
-      return { model, colour, name, opacity: nParts ? 0 : isWall ? 0.4 : 0.07, top: topOf(vertices) };
+      return { model, colour, name, opacity: nParts && renderer instanceof Renderer ? 0 : isWall ? 0.4 : 0.07, top: topOf(vertices) };
     });
     const ball = new Model(renderer, models.sphere);
     this.bases = scenery.bases.filter(({ opacity }) => opacity > 0).map(({ pos, radius, team, opacity }) => {
@@ -42,7 +43,7 @@ export class Scenery {
       return { model: ball, pos, radius, colour, name, top: add(pos, [0, 0, radius]), opacity: 0.35 * opacity };
     });
     this.outlines.upload();
-    /** @type {TerrainMesh | null} */
+    /** @type {TerrainMesh | PlainTerrain | null} */
     this.terrain = null;
     /** @type {MeshPart[]} */
     this.parts = [];
@@ -62,6 +63,7 @@ export class Scenery {
   /** Bring in heights, images and coloured parts, which are unpacked after the page is there. @param {Source} source */
   async read(source) {
     await this.readTerrain(source);
+    if (this.renderer instanceof PlainRenderer) return;
     const nParts = this.data.regions.reduce((sum, region) => sum + region.nParts, 0);
     for (let i = 0; i < nParts; i++) {
       const bytes = await source.blob(`part-${i}`);
@@ -80,8 +82,15 @@ export class Scenery {
     const n = terrain.x.length * terrain.y.length;
     const steps = new Reader(await source.blob('terrain')).ints(n);
     for (let i = 1; i < n; i++) steps[i] += steps[i - 1];
-    this.terrain = new TerrainMesh(this.renderer, terrain, Float32Array.from(steps, (step) => terrain.low + terrain.step * step), this.anchor);
-    if (terrain.hasTexture) this.terrain.image = await this.renderer.texture(await source.blob('texture'));
+    const heights = Float32Array.from(steps, (step) => terrain.low + terrain.step * step);
+    const texture = terrain.hasTexture ? await source.blob('texture') : null;
+    if (this.renderer instanceof PlainRenderer) {
+      this.terrain = new PlainTerrain(this.renderer, terrain, heights);
+      if (texture) this.terrain.image = await imageOf(texture);
+      return;
+    }
+    this.terrain = new TerrainMesh(this.renderer, terrain, heights, this.anchor);
+    if (texture) this.terrain.image = await this.renderer.texture(texture);
   }
 
   /** Distance of the narrowest grid lines, and how clearly they are seen, 0 to 1. @param {View} view */
@@ -94,6 +103,10 @@ export class Scenery {
 
   /** @param {{ sky: number[], ground: number[] }} colours */
   drawSky(colours) {
+    if (this.renderer instanceof PlainRenderer) {
+      this.renderer.fill(colours.ground);
+      return;
+    }
     const { gl } = this.renderer;
     gl.disable(gl.DEPTH_TEST);
     this.renderer.use('sky', { above: colours.sky, below: colours.ground });
@@ -113,6 +126,10 @@ export class Scenery {
     this.axes.draw(view, 2, 0.9);
     if (this.terrain) return;
     const { spacing, nearer } = this.cell(view);
+    if (this.renderer instanceof PlainRenderer) {
+      this.renderer.drawGrid(view, spacing, nearer, colours.grid);
+      return;
+    }
     const reach = 6 * Math.max(view.distance, Math.abs(view.eye[2] - this.data.ground));
     const centre = [target[0] - view.anchor[0], target[1] - view.anchor[1]];
     const middle = [...centre, this.data.ground - view.anchor[2]];

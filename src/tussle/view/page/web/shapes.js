@@ -4,6 +4,7 @@
 import { add, minus, norm, unit } from './geometry.js';
 import { circle, Lines } from './lines.js';
 import { LEVEL, Model } from './models.js';
+import { PlainRenderer } from './plain.js';
 import { Renderer } from './renderer.js';
 
 /** Least size of a point [pixels]. */
@@ -16,7 +17,7 @@ const BOX = {
 };
 
 export class Shapes {
-  /** @param {Renderer} renderer @param {import('./types').Mesh} ball */
+  /** @param {Renderer | PlainRenderer} renderer @param {import('./types').Mesh} ball */
   constructor(renderer, ball) {
     this.renderer = renderer;
     this.lines = new Lines(renderer);

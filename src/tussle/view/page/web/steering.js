@@ -56,7 +56,7 @@ export class Steering {
       this.canvas.classList.add('is-dragged');
     }
     if (this.down.size >= 2) this.pinch(event.pointerId, was, now);
-    else if (this.isPan) this.pan(now.x - was.x, now.y - was.y);
+    else if (this.isPan || player.picture.isPlain) this.pan(now.x - was.x, now.y - was.y);
     else player.camera.turn(-0.006 * (now.x - was.x), 0.006 * (now.y - was.y));
     this.down.set(event.pointerId, now);
     return player.look();

@@ -4,6 +4,7 @@
 import { between } from './geometry.js';
 import { Layer } from './layer.js';
 import { Lines } from './lines.js';
+import { PlainRenderer } from './plain.js';
 import { Renderer } from './renderer.js';
 
 /** Points of all trails together; with more, each has fewer. */
@@ -14,7 +15,7 @@ export const TRAIL_OF_CHOSEN = 10;
 export const TRAIL_LENGTHS = [0, 1, 2, 5, 10, 30, 120, Infinity];
 
 export class Trails extends Lines {
-  /** @param {Renderer} renderer @param {Layer} layer */
+  /** @param {Renderer | PlainRenderer} renderer @param {Layer} layer */
   constructor(renderer, layer) {
     super(renderer);
     this.layer = layer;

@@ -37,7 +37,7 @@ export interface PageData {
   // Of a recorded run.
   nFrames?: number; nStates?: number; nEntities?: number[]; mostAtOnce?: number; chunks?: [number, number][]; positionError?: number;
   angleError?: number; begins?: number; runs?: { name: string; title: string; teams: number[]; teamShift: number }[]; shift?: Vector; signs?: [string, Vector][]; differing?: [string, string, string][]; quantities?: [string, string][];
-  warp?: number | null; isPlaying?: boolean; lead?: string; shapeFrames?: number; columns?: Column[];
+  warp?: number | null; isPlaying?: boolean; lead?: string; shapeFrames?: number; columns?: Column[]; alarms?: SpecificationCourse[];
   // Of a live game.
   seed?: number; endTime?: number | null; dt?: number;
 }
@@ -55,8 +55,13 @@ export interface Status {
 
 /** How far a game is from breaking a specification, see alarms.py; null where a number is not known. */
 export interface SpecificationState {
-  text: string; unit: string; state: 'holds' | 'near' | 'failed' | 'open' | 'unknown'; now: number | null; ended: number | null; least: number | null; reached: number | null;
+  id?: number; text: string; unit: string; state: 'holds' | 'near' | 'failed' | 'open' | 'unknown'; now: number | null; ended: number | null; least: number | null; reached: number | null;
   since: number | null; note: string;
+}
+
+/** What a specification came to in a recorded run, see alarms.py; `id` is that of its curve. */
+export interface SpecificationCourse {
+  id: number; text: string; unit: string; near: number | null; failed: number | null; t: number[]; least: (number | null)[]; note: string;
 }
 
 /** A field of an order: components by name, or a single value; their units. */

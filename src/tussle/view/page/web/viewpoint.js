@@ -63,7 +63,7 @@ export class Viewpoint {
     const { canvas } = this.player;
     this.camera.fit((see) => {
       for (let i = 0; i < shown.n; i++) if (!this.player.isHidden(i)) see(shown.x[i], shown.y[i], shown.z[i]);
-    }, canvas.width / canvas.height, this.room());
+    }, canvas.clientWidth / canvas.clientHeight, this.room());
   }
 
   /** Shares of the view that panels cover, or are to be kept free beside them: below the panels at the top, or between them. */
