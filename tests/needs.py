@@ -93,6 +93,12 @@ NEEDS = {
     "fastdds": Need("Fast DDS", _has_headers(FASTDDS), "g++ libfastrtps-dev libfastcdr-dev"),
     "g++": Need("a compiler of C++", _has_program("g++"), "g++"),
     "mkdocs": Need("MkDocs", _has_module("mkdocstrings_handlers"), command="pip install '.[docs]'"),
+    "moos": Need(
+        "MOOS-IvP",
+        lambda: all(map(program, ("MOOSDB", "pHelmIvP"))),
+        command="build MOOSDB and pHelmIvP of https://github.com/moos-ivp/moos-ivp",
+        is_optional=True,
+    ),
     "node": Need("Node.js", _has_program("node"), "nodejs npm"),
     "opendis": Need("opendis", _has_module("opendis"), command="pip install --no-deps opendis"),
     "renderer": Need("OSMesa or EGL", _has_renderer, "libosmesa6"),
