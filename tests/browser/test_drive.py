@@ -1,12 +1,18 @@
 """An entity is driven by the keys of a browser, until it is given back."""
 
 import pytest
+from page_client import PageClient
 from served import UNHURRIED, Watched
 
 from tussle import Block, Mission, Simulation
 from tussle.stock import GoTo, SingleIntegrator
 from tussle.view import Live
 from tussle.view.page.server import Page
+
+CATCH_SOCKET = """() => {
+  const send = WebSocket.prototype.send;
+  WebSocket.prototype.send = function (data) { window.socketOfPage = this; return send.call(this, data); };
+}"""
 
 
 @pytest.fixture(scope="module")
@@ -53,6 +59,35 @@ def test_keys_drive_it_and_escape_gives_it_back(driver):
     watched.tab.keyboard.press("Escape")
     watched.until(lambda: sticks(live) is None)
     assert watched.tab.evaluate("() => player.chosen") == 1
+
+
+def test_orders_that_are_refused_do_not_give_it_back(driver):
+    live, watched = driver
+    watched.tab.evaluate(CATCH_SOCKET)
+    watched.press("j")
+    watched.until(lambda: sticks(live) is not None)
+    watched.tab.evaluate("() => socketOfPage.send(JSON.stringify({ do: 'remove', entities: [0] }))")
+    watched.wait("document.body.innerText.includes('is not allowed')")
+    watched.tab.keyboard.down("w")
+    watched.until(lambda: max(map(abs, sticks(live))) > 0.6)
+    # A window that is left has no keys that are held, also if it draws no more.
+    watched.tab.evaluate(
+        "() => { window.requestAnimationFrame = () => 0; window.dispatchEvent(new Event('blur')); }"
+    )
+    watched.until(lambda: sticks(live) == (0.0, 0.0, 0.0))
+
+
+def test_who_is_refused_the_sticks_does_not_seem_to_drive(driver):
+    live, watched = driver
+    with PageClient(watched.page.url) as other:
+        other.wait(lambda: other.status)
+        other.order("drive", entities=[1], sticks=[0.5, 0.0, 0.0])
+        watched.until(lambda: sticks(live) is not None)
+        watched.press("j")
+        watched.wait("document.body.innerText.includes('another browser drives entity 1')")
+        watched.wait("document.querySelector('#drive button').innerText === 'Take over'")
+        assert sticks(live) == pytest.approx((0.5, 0.0, 0.0), abs=0.01)
+    watched.until(lambda: sticks(live) is None)
 
 
 def test_another_choice_gives_it_back(driver):

@@ -136,6 +136,12 @@ def test_an_operator_drives_an_entity_until_the_browser_goes(page):
             refused(other, "drive", {"entities": [3], "sticks": [0.0, 0.0, 0.0]})
             == "another browser drives entity 3"
         )
+        assert other.n_undriven >= 1
+        refused(client, "order", {"receivers": [1], **ORDER})
+        client.wait(lambda: client.n_frames)
+        assert (
+            client.n_undriven == 0
+        )  # another order that is refused says nothing of the entity that it drives
         for sticks in ([2.0, 0.0, 0.0], [1.0, 0.0], "north"):
             assert refused(client, "drive", {"entities": [3], "sticks": sticks}).startswith("sticks")
         client.order("drive", entities=[4], sticks=[1.0, 0.0, 0.0])

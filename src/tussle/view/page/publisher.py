@@ -52,6 +52,7 @@ STATUS_PERIOD = 0.25
 """Period at which numbers, notes, events and the chosen entity are sent [s]."""
 MAX_MESSAGES = 200
 """Largest number of messages per second that are read from one browser; further ones wait."""
+TOO_MANY = f"this page sends more than {MAX_MESSAGES} messages a second; the further ones wait"
 MAX_EVENTS = 2000
 """Largest number of events in one message."""
 MAX_CHANGES = 5000
@@ -88,6 +89,7 @@ class Reader:
         self.is_due = False
         self.past: deque[bytes] = deque(maxlen=MAX_LOOKS)
         self.refusal: str | None = None
+        self.is_drive_refused = False
         self.refused_at = -REFUSAL_PERIOD
         self.events_sent: list[Event] = []
         self.wanted: frozenset[tuple[str, int]] = frozenset()
@@ -218,7 +220,9 @@ class FramePublisher:
             while not socket.closed:
                 now = time.monotonic()
                 reader.free_at = max(reader.free_at, now - 1.0) + 1.0 / MAX_MESSAGES
-                await asyncio.sleep(max(0.0, reader.free_at - now))
+                if reader.free_at > now:
+                    self._refuse(reader, TOO_MANY)
+                    await asyncio.sleep(reader.free_at - now)
                 received = await socket.receive()
                 if received.data is None or socket.closed:
                     break
@@ -267,6 +271,7 @@ class FramePublisher:
         live, seen = self._live, self._seen.now
         result = seen.details.result
         refusal, reader.refusal = reader.refusal, None
+        is_drive_refused, reader.is_drive_refused = reader.is_drive_refused, False
         warp = live.warp
         error = live.error
         now = time.monotonic()
@@ -277,7 +282,7 @@ class FramePublisher:
             "rate": sum(now - moment <= 1.0 for moment in self._moments),
             "notes": [*live.notes, *self._drawing_notes, *self._failures.texts], "error": None if error is None else str(error),
             "metrics": [] if result is None else result_rows(result, live.teams), "events": self._new_events(reader),
-            "entity": self._entity(reader), "refusal": refusal, "steers": self._may_steer(reader),
+            "entity": self._entity(reader), "refusal": refusal, "isDriveRefused": is_drive_refused, "steers": self._may_steer(reader),
             "role": asdict(reader.role),
             "feed": feed_rows(seen.details.feed) if reader.has_feed else None,
             "alarms": [
@@ -399,15 +404,17 @@ class FramePublisher:
             ),
         }
         with self._failures.caught():
+            name = ""
             try:
                 read = read_command(text, commands)
                 if read is None:
                     return
-                command = commands[read[0]]
-                self._check_role(reader, command, read[1])
-                command.do(**read[1])
+                name, given = read
+                self._check_role(reader, commands[name], given)
+                commands[name].do(**given)
             except ParameterError as error:
                 self._refuse(reader, str(error))
+                reader.is_drive_refused |= name == "drive"
             for each in self.readers:
                 each.status_due = 0.0
 

@@ -36,7 +36,12 @@ export class Drive {
     // Before the keys of the page, which mean something else meanwhile.
     document.addEventListener('keydown', (event) => this.press(event), true);
     document.addEventListener('keyup', ({ key }) => this.held.delete(key.toLowerCase()), true);
-    window.addEventListener('blur', () => this.held.clear());
+    // At once: a page that is hidden draws no more frames.
+    window.addEventListener('blur', () => {
+      this.held.clear();
+      this.update();
+    });
+    document.addEventListener('visibilitychange', () => this.update());
   }
 
   /** What is known of the chosen entity, if this address may drive it. */
@@ -114,6 +119,7 @@ export class Drive {
   /** Deflections ahead, left and up. @param {string[]} channels */
   sticks(channels) {
     const sum = [0, 0, 0];
+    if (document.hidden) return sum;
     for (const key of this.held) sum[STICK_KEYS[key][0]] += STICK_KEYS[key][1];
     for (const pad of navigator.getGamepads?.() ?? []) {
       [1, 0, 3].forEach((axis, i) => { if (Math.abs(pad?.axes[axis] ?? 0) > REST) sum[i] -= pad.axes[axis]; });
