@@ -5,7 +5,7 @@ from page_client import PageClient
 from served import UNHURRIED, Watched
 
 from tussle import Block, Mission, Simulation
-from tussle.stock import GoTo, SingleIntegrator
+from tussle.stock import GoTo, SingleIntegrator, Still
 from tussle.view import Live
 from tussle.view.page.server import Page
 
@@ -18,7 +18,10 @@ CATCH_SOCKET = """() => {
 @pytest.fixture(scope="module")
 def game(chromium):
     kind = {"motion": SingleIntegrator(max_speed=5.0), "autonomy": GoTo(speed=2.0)}
-    blocks = [Block(name="drone", team=1, count=2, position=(0, 0, 20), variance=(400, 400, 0), **kind)]
+    blocks = [
+        Block(name="drone", team=1, count=2, position=(0, 0, 20), variance=(400, 400, 0), **kind),
+        Block(name="post", team=1, position=(0, -40, 20), motion=Still()),
+    ]
     with (
         Simulation(Mission(name="driven", blocks=blocks, end=3000.0, dt=0.1, end_conditions="time"), 3) as simulation,
         Live(simulation, pace=1.0) as live, Page(live, viewer=UNHURRIED) as page,
@@ -88,6 +91,22 @@ def test_who_is_refused_the_sticks_does_not_seem_to_drive(driver):
         watched.wait("document.querySelector('#drive button').innerText === 'Take over'")
         assert sticks(live) == pytest.approx((0.5, 0.0, 0.0), abs=0.01)
     watched.until(lambda: sticks(live) is None)
+
+
+def test_what_cannot_be_driven_is_said(game):
+    _, page, chromium = game
+    watched = Watched(chromium, page, {"width": 1100, "height": 760})
+    watched.press("j")
+    watched.wait("document.body.innerText.includes('Click the entity that you want to drive')")
+    watched.choose(3)
+    refusal = "post 3 has no channel that keys can drive"
+    watched.until(
+        lambda: (
+            watched.press("j") or watched.tab.evaluate(f"() => document.body.innerText.includes('{refusal}')")
+        )
+    )
+    watched.close()
+    assert not watched.trouble, "\n".join(watched.trouble)
 
 
 def test_another_choice_gives_it_back(driver):

@@ -51,6 +51,17 @@ export class Drive {
     return entity?.id === chosen && layer.slotOf(chosen) >= 0 && orders.may(chosen) && Object.keys(entity.axes).length ? entity : null;
   }
 
+  /** Why nothing is driven. */
+  get obstacle() {
+    const { layer, chosen, orders } = this.player;
+    if (!(layer instanceof Live)) return 'Only a live game has entities that are driven';
+    if (layer.status.isOver) return 'The game is over: nobody is driven';
+    if (!chosen || layer.slotOf(chosen) < 0) return 'Click the entity that you want to drive';
+    if (!orders.may(chosen)) return `This address may not drive ${layer.who(chosen)}`;
+    if (layer.status.entity?.id !== chosen) return `${layer.who(chosen)} is still being read: try again`;
+    return `${layer.who(chosen)} has no channel that keys can drive`;
+  }
+
   show() {
     const { entity, who } = this;
     this.box.hidden = !entity;
@@ -74,7 +85,7 @@ export class Drive {
       this.sent = '';
       this.held.clear();
       player.say(`You drive ${player.layer.who(this.who)}`);
-    }
+    } else player.say(this.obstacle);
     player.look();
   }
 
