@@ -50,8 +50,19 @@ class Need:
 
 def program(*names: str) -> str | None:
     """Path of the first of some programs that is there: on the PATH, or installed by npm."""
-    path = f"{os.environ.get('PATH', '')}{os.pathsep}{ROOT / 'node_modules' / '.bin'}"
-    return next((found for name in names if (found := shutil.which(name, path=path))), None)
+    return next((found for name in names if (found := shutil.which(name, path=_path()))), None)
+
+
+def axe() -> Path | None:
+    """The script of axe-core, which checks pages, where npm has installed it."""
+    folders = (Path(each).parent for each in _path().split(os.pathsep) if each.endswith(".bin"))
+    return next(
+        (script for folder in folders if (script := folder / "axe-core" / "axe.min.js").exists()), None
+    )
+
+
+def _path() -> str:
+    return f"{os.environ.get('PATH', '')}{os.pathsep}{ROOT / 'node_modules' / '.bin'}"
 
 
 def _has_program(*names: str) -> Callable[[], bool]:
@@ -89,6 +100,7 @@ def _has_renderer() -> bool:
 
 
 NEEDS = {
+    "axe": Need("axe-core", lambda: axe() is not None, command="npm install", is_optional=True),
     "browser": Need("a browser", _has_program(*BROWSERS), "chromium fonts-dejavu-core"),
     "fastdds": Need("Fast DDS", _has_headers(FASTDDS), "g++ libfastrtps-dev libfastcdr-dev"),
     "g++": Need("a compiler of C++", _has_program("g++"), "g++"),
