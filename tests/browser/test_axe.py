@@ -51,7 +51,7 @@ def live():
             yield page
 
 
-@pytest.mark.parametrize(("width", "height"), [(1600, 900), (390, 844)])
+@pytest.mark.parametrize(("width", "height"), [(1000, 640), (390, 700)])
 def test_axe_finds_nothing_on_a_live_page(chromium, axe, live, width, height):
     watched = Watched(chromium, live, {"width": width, "height": height})
     watched.wait("player.frame === 60")
@@ -122,7 +122,7 @@ def test_keys_alone_choose_an_entity_order_it_somewhere_and_remove_it(chromium):
         keys.press("ArrowRight")
         watched.wait("document.querySelector('#orders') && !document.querySelector('#orders').hidden")
         seen = []
-        for _ in range(120):
+        for _ in range(70):
             keys.press("Tab")
             seen.append(watched.tab.evaluate(FOCUSED))
         rounds = [k for k, (is_body, _, _) in enumerate(seen) if is_body]
