@@ -1,5 +1,7 @@
 """An entity is driven by the keys of a browser, until it is given back."""
 
+import time
+
 import pytest
 from page_client import PageClient
 from served import UNHURRIED, Watched
@@ -7,6 +9,7 @@ from served import UNHURRIED, Watched
 from tussle import Block, Mission, Simulation
 from tussle.stock import GoTo, SingleIntegrator, Still
 from tussle.view import Live
+from tussle.view.page import publisher
 from tussle.view.page.server import Page
 
 CATCH_SOCKET = """() => {
@@ -78,6 +81,19 @@ def test_orders_that_are_refused_do_not_give_it_back(driver):
         "() => { window.requestAnimationFrame = () => 0; window.dispatchEvent(new Event('blur')); }"
     )
     watched.until(lambda: sticks(live) == (0.0, 0.0, 0.0))
+
+
+def test_a_page_that_stands_still_keeps_it_and_one_that_is_lost_gives_it_back(driver, monkeypatch):
+    monkeypatch.setattr(publisher, "DRIVE_LEASE", 3.0)
+    live, watched = driver
+    watched.press("j")
+    watched.until(lambda: sticks(live) is not None)
+    began = time.monotonic()
+    watched.until(lambda: sticks(live) is None or time.monotonic() - began > 5.0)
+    assert sticks(live) is not None
+    watched.tab.evaluate("() => { WebSocket.prototype.send = () => undefined; }")
+    watched.until(lambda: sticks(live) is None)
+    watched.wait("document.querySelector('#drive button').innerText === 'Take over'")
 
 
 def test_who_is_refused_the_sticks_does_not_seem_to_drive(driver):

@@ -57,6 +57,8 @@ MAX_EVENTS = 2000
 """Largest number of events in one message."""
 MAX_CHANGES = 5000
 """Number of changes at which a message is full; those of one quantity are sent together."""
+DRIVE_LEASE = 10.0
+"""Time after which an entity is given back if its driver's browser, which repeats its sticks each second, is silent [s]."""
 REFUSAL_PERIOD = 1.0
 """Least time between two messages about refused values [s]."""
 PAST_FRAMES, PAST_STATES = 120, 60_000
@@ -74,6 +76,7 @@ class Reader:
         chosen: Id of the entity whose state it reads; 0 for nobody.
         has_feed: It reads the messages of the game.
         driven: Id of the entity that it drives; 0 for none.
+        sticks: Those that it has sent last, and when.
         wake: There is something to be sent.
     """
 
@@ -82,6 +85,7 @@ class Reader:
         self.chosen = 0
         self.has_feed = False
         self.driven = 0
+        self.sticks: tuple[list[float], float] = [], 0.0
         self.wake = asyncio.Event()
         self.wake.set()
         self.frame_sent = self.drawn_sent = 0
@@ -164,6 +168,7 @@ class FramePublisher:
             is_needed = bool(self.readers) or self._live.see > 0.0
             if is_needed:
                 with self._failures.caught():
+                    self._end_leases()
                     self._look()
                     self._make_frame()
                 with self._failures.caught():
@@ -429,9 +434,22 @@ class FramePublisher:
             raise ParameterError(f"another browser drives entity {who}")
         if reader.driven not in (0, who):
             self._live.drive(reader.driven, None)
-        reader.driven = who
-        if who:
+        is_new = reader.driven != who or reader.sticks[0] != sticks
+        reader.driven, reader.sticks = who, (sticks or [], time.monotonic())
+        if who and is_new:
             self._live.drive(who, sticks)
+
+    def _end_leases(self) -> None:
+        """Give entities back whose drivers are silent: a connection can be lost without an end."""
+        for reader in self.readers:
+            if reader.driven and time.monotonic() - reader.sticks[1] > DRIVE_LEASE:
+                self._refuse(
+                    reader,
+                    f"entity {reader.driven} is given back: nothing came from this page for {DRIVE_LEASE:g} s",
+                )
+                reader.is_drive_refused = True
+                with given_by(str(reader.role)):
+                    self._drive(reader, [], None)
 
     def _refuse(self, reader: Reader, reason: str) -> None:
         """Report a rejected value; of consecutive ones, only the first."""

@@ -8,6 +8,8 @@ import { Live } from './live.js';
 
 /** Steps of a stick from its middle to its end. */
 const STEPS = 127;
+/** Time after which sticks are sent again that have not changed, since silence gives the entity back [ms]. */
+const REPEAT = 1000;
 /** Deflection of a gamepad below which it rests. */
 const REST = 0.12;
 /** Key -> axis and deflection. @type {Record<string, [number, number]>} */
@@ -31,6 +33,7 @@ export class Drive {
     /** Channels of the entity that is driven. @type {string[]} */
     this.channels = [];
     this.sent = '';
+    this.sentAt = 0;
     /** @type {Set<string>} */
     this.held = new Set();
     // Before the keys of the page, which mean something else meanwhile.
@@ -42,6 +45,7 @@ export class Drive {
       this.update();
     });
     document.addEventListener('visibilitychange', () => this.update());
+    setInterval(() => this.update(), REPEAT / 2);
   }
 
   /** What is known of the chosen entity, if this address may drive it. */
@@ -122,8 +126,9 @@ export class Drive {
     }
     const sticks = this.sticks(this.channels).map((x) => Math.round(STEPS * between(x, -1, 1)) / STEPS + 0);
     const text = sticks.join();
-    if (text === this.sent) return;
+    if (text === this.sent && performance.now() - this.sentAt < REPEAT) return;
     this.sent = text;
+    this.sentAt = performance.now();
     player.order('drive', { entities: [who], sticks });
   }
 
