@@ -63,8 +63,8 @@ DRIVES = {
 }  # fmt: skip
 """Channel -> how it is driven. Velocities, accelerations and points are in the world frame: ahead is North, left is West."""
 OF_WORLD = "velocity_y", "acceleration_y", "position_y"
-HELD_HEADING = Drive(LEFT, 0.0, (), "yaw")
-"""In place of a turn, where the sticks are in the world frame."""
+HELD = {"desired_heading": Drive(LEFT, 0.0, (), "yaw"), "turn_rate": Drive(LEFT, 0.0)}
+"""Channel -> how it is held where other channels are in the world frame: who goes to the left does not turn."""
 
 
 class Driven(NamedTuple):
@@ -84,7 +84,7 @@ def driven_channels(group: Group) -> list[Driven]:
         Driven(channel, row, DRIVES[channel]) for channel, row in read if row in written and channel in DRIVES
     ]
     if any(each.channel in OF_WORLD for each in found):
-        return [each._replace(drive=HELD_HEADING) if each.drive.base == "yaw" else each for each in found]
+        return [each._replace(drive=HELD.get(each.channel, each.drive)) for each in found]
     return found
 
 

@@ -9,7 +9,7 @@ from tussle.engine.manual import axes_of
 from tussle.messages import ManualControl
 from tussle.mission import mission_of, read_mission
 from tussle.record import load_inputs
-from tussle.stock import SimpleCar, SingleIntegrator, Still, Straight, Unicycle, UnicyclePID
+from tussle.stock import DoubleIntegrator, SimpleCar, SingleIntegrator, Still, Straight, Unicycle, UnicyclePID
 from tussle.view import Live
 
 
@@ -235,6 +235,19 @@ def test_velocities_are_driven_north_and_west(update):
         def step(self, g):
             self.velocity[:] = 0.0
 
+    class Turns(Autonomy):
+        acceleration = Output("acceleration_x acceleration_y acceleration_z", unit="m/s^2")
+        turn_rate = Output(unit="rad/s")
+
+        def step(self, g):
+            self.acceleration[:], self.turn_rate[:] = 0.0, 0.5
+
+    top = Block(name="top", position=(90, 0, 0), autonomy=Turns(), motion=DoubleIntegrator())
+    with Simulation(Mission(blocks=[top], end=9.0, dt=0.1, update=update), 1) as simulation:
+        simulation.publish(ManualControl, entity=1, is_on=True, sticks=np.array([0.0, 1.0, 0.0]))
+        simulation.step(5)
+        assert simulation.read("top.vel")[0][0, 0, 0] < -0.3
+        assert axes_of(simulation.state.population.groups[0])["left"] == ["acceleration_x"]
     block = Block(name="dot", autonomy=Still0(), motion=SingleIntegrator(max_speed=5.0))
     with Simulation(Mission(blocks=[block], end=9.0, dt=0.1, update=update), 1) as simulation:
         simulation.publish(ManualControl, entity=1, is_on=True, sticks=np.array([1.0, 0.0, 0.0]))
