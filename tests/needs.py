@@ -50,8 +50,19 @@ class Need:
 
 def program(*names: str) -> str | None:
     """Path of the first of some programs that is there: on the PATH, or installed by npm."""
-    path = f"{os.environ.get('PATH', '')}{os.pathsep}{ROOT / 'node_modules' / '.bin'}"
-    return next((found for name in names if (found := shutil.which(name, path=path))), None)
+    return next((found for name in names if (found := shutil.which(name, path=_path()))), None)
+
+
+def axe() -> Path | None:
+    """The script of axe-core, which checks pages, where npm has installed it."""
+    folders = (Path(each).parent for each in _path().split(os.pathsep) if each.endswith(".bin"))
+    return next(
+        (script for folder in folders if (script := folder / "axe-core" / "axe.min.js").exists()), None
+    )
+
+
+def _path() -> str:
+    return f"{os.environ.get('PATH', '')}{os.pathsep}{ROOT / 'node_modules' / '.bin'}"
 
 
 def _has_program(*names: str) -> Callable[[], bool]:
@@ -89,10 +100,17 @@ def _has_renderer() -> bool:
 
 
 NEEDS = {
+    "axe": Need("axe-core", lambda: axe() is not None, command="npm install", is_optional=True),
     "browser": Need("a browser", _has_program(*BROWSERS), "chromium fonts-dejavu-core"),
     "fastdds": Need("Fast DDS", _has_headers(FASTDDS), "g++ libfastrtps-dev libfastcdr-dev"),
     "g++": Need("a compiler of C++", _has_program("g++"), "g++"),
     "mkdocs": Need("MkDocs", _has_module("mkdocstrings_handlers"), command="pip install '.[docs]'"),
+    "moos": Need(
+        "MOOS-IvP",
+        lambda: all(map(program, ("MOOSDB", "pHelmIvP"))),
+        command="build MOOSDB and pHelmIvP of https://github.com/moos-ivp/moos-ivp",
+        is_optional=True,
+    ),
     "node": Need("Node.js", _has_program("node"), "nodejs npm"),
     "opendis": Need("opendis", _has_module("opendis"), command="pip install --no-deps opendis"),
     "renderer": Need("OSMesa or EGL", _has_renderer, "libosmesa6"),

@@ -3,12 +3,12 @@
 import contextlib
 import os
 import re
-import shutil
 import signal
 import socket
 import subprocess
 import sys
 
+import needs
 import numpy as np
 import pytest
 from pages import FENCE, ROOT
@@ -27,9 +27,8 @@ def free_port():
 
 @pytest.mark.parametrize("which", ["the tests' own", "installed"])
 def test_what_the_page_tells_one_to_type_moves_a_boat(tmp_path, which):
-    missing = [name for name in PROGRAMS if not shutil.which(name)]
-    if which == "installed" and missing:
-        pytest.skip(f"needs {' and '.join(missing)} of MOOS-IvP on the PATH")
+    if which == "installed":
+        needs.require("moos")
     programs, folder = tmp_path / "bin", tmp_path / "work"
     programs.mkdir()
     folder.mkdir()

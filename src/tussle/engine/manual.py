@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from functools import partial
 from typing import NamedTuple
@@ -22,6 +23,10 @@ TURNS = "turn_rate_max", "max_yaw_vel"
 PITCHES = "pitch_rate_max", "max_pitch_rate"
 ACCELERATIONS = "max_acc", "accel_max"
 SLOWEST = "min_velocity", "speed_min"
+OF_AIRCRAFT = "aileron", "desired_roll"
+"""Channels of motion models that fly by their wings, unless they have a lowest speed."""
+FASTER = 0.5
+"""Share of the speed that their autonomies want by which a full stick makes these faster or slower."""
 
 
 class Drive(NamedTuple):
@@ -57,6 +62,9 @@ DRIVES = {
     "desired_heading": Drive(LEFT, 0.8, (), "yaw"), "desired_altitude": Drive(UP, 20.0, (), "z"),
 }  # fmt: skip
 """Channel -> how it is driven. Velocities, accelerations and points are in the world frame: ahead is North, left is West."""
+OF_WORLD = "velocity_y", "acceleration_y", "position_y"
+HELD = {"desired_heading": Drive(LEFT, 0.0, (), "yaw"), "turn_rate": Drive(LEFT, 0.0)}
+"""Channel -> how it is held where other channels are in the world frame: who goes to the left does not turn."""
 
 
 class Driven(NamedTuple):
@@ -72,9 +80,12 @@ def driven_channels(group: Group) -> list[Driven]:
     reader = (*group.controllers, group.motion)[0]
     written = {row for _, row in _channels(group, group.autonomies, is_output=True)}
     read = _channels(group, [reader], is_output=False)
-    return [
+    found = [
         Driven(channel, row, DRIVES[channel]) for channel, row in read if row in written and channel in DRIVES
     ]
+    if any(each.channel in OF_WORLD for each in found):
+        return [each._replace(drive=HELD.get(each.channel, each.drive)) for each in found]
+    return found
 
 
 def _channels(group: Group, bindings: list[Binding], is_output: bool) -> Iterator[tuple[str, int]]:
@@ -90,7 +101,10 @@ def _channels(group: Group, bindings: list[Binding], is_output: bool) -> Iterato
 def axes_of(group: Group) -> dict[str, list[str]]:
     """Axis -> the channels of a group that it drives; empty for entities that cannot be driven."""
     found = driven_channels(group)
-    axes = {axis: [each.channel for each in found if AXES[each.drive.axis] == axis] for axis in AXES}
+    axes = {
+        axis: [each.channel for each in found if AXES[each.drive.axis] == axis and each.drive.full]
+        for axis in AXES
+    }
     return axes if found else {}
 
 
@@ -138,8 +152,9 @@ def _drive(
         if not 0 <= mine < group.n:
             continue
         for _, place, drive in channels:
-            kept.append((place, mine, float(data[place, mine])))
-            data[place, mine] = _command(group, mine, drive, state.manual[key])
+            wanted = float(data[place, mine])
+            kept.append((place, mine, wanted))
+            data[place, mine] = _command(group, mine, drive, state.manual[key], wanted)
 
 
 def _give_back(group: Group, kept: list[tuple[int, int, float]]) -> None:
@@ -149,11 +164,14 @@ def _give_back(group: Group, kept: list[tuple[int, int, float]]) -> None:
     kept.clear()
 
 
-def _command(group: Group, row: int, drive: Drive, sticks: tuple[float, ...]) -> float:
+def _command(group: Group, row: int, drive: Drive, sticks: tuple[float, ...], wanted: float) -> float:
+    """The value of a channel; `wanted` is that of the autonomies."""
     stick, bodies, at = sticks[drive.axis], group.bodies, group.first + row
     full = _parameter(group, row, drive.limits) or abs(drive.full)
     if drive.limits is SPEEDS and drive.axis == AHEAD and not drive.base:
         slowest = min(_parameter(group, row, SLOWEST), full)
+        if wanted > 0.0 and _is_aircraft(group, row):
+            return wanted * (1.0 + FASTER * stick)
         if slowest > 0.0:  # it cannot stand still: the middle of the stick is the middle of its speeds
             return 0.5 * (full + slowest) + 0.5 * (full - slowest) * stick
     command = stick * (full if drive.full > 0.0 else -full)
@@ -162,14 +180,27 @@ def _command(group: Group, row: int, drive: Drive, sticks: tuple[float, ...]) ->
     return command + float(bodies.pos["xyz".index(drive.base), at]) if drive.base else command
 
 
+def _is_aircraft(group: Group, row: int) -> bool:
+    """Whether an entity falls when it stands still, and has no lowest speed that says so."""
+    lowest = [_value(group, group.motion, row, name) for name in SLOWEST]
+    return bool({*group.motion.spec.input_channels()} & {*OF_AIRCRAFT}) and not any(
+        map(math.isfinite, lowest)
+    )
+
+
 def _parameter(group: Group, row: int, names: tuple[str, ...]) -> float:
-    """The first of these parameters that is positive: of the motion model, then of controllers and autonomies; 0 without one."""
+    """The first of these parameters that is positive and finite: of the motion model, then of controllers and autonomies; else 0."""
     for binding in (group.motion, *group.controllers, *group.autonomies):
         for name in names:
-            place = binding.places.get(name) if name in binding.params else None
-            if place is not None and not place.k and (value := float(group.table.array(place)[row])) > 0.0:
+            if 0.0 < (value := _value(group, binding, row, name)) < math.inf:
                 return value
     return 0.0
+
+
+def _value(group: Group, binding: Binding, row: int, name: str) -> float:
+    """Value of a parameter; nan where the plugin has none of this name, or one of several numbers."""
+    place = binding.places.get(name) if name in binding.params else None
+    return math.nan if place is None or place.k else float(group.table.array(place)[row])
 
 
 def manual_columns(state: SimulationState, world: int) -> np.ndarray:

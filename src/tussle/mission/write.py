@@ -100,7 +100,7 @@ def to_xml(mission: GivenMission, seed: int | None = None) -> str:
     if seed is not None or reseed:
         root.children.append(_node("seed", reseed, "" if seed is None else str(seed)))
     origin = mission.scene.origin
-    for name in ("latitude", "longitude", "altitude"):
+    for name in () if origin.is_default else ("latitude", "longitude", "altitude"):
         root.children.append(_value(f"{name}_origin", getattr(origin, name), WORLD))
     for plugin in () if mission.compat else (p for outer in mission.plugins for p in outer.walk()):
         if type(plugin).__module__.startswith(HISTORIC):

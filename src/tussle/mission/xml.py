@@ -336,6 +336,8 @@ class _WorldReader:
     def _origin(self) -> Origin:
         names = ("latitude_origin", "longitude_origin", "altitude_origin")
         nodes = [node for name in names if (node := self._last(name))]
+        if not nodes:
+            return Origin()
         fields = Fields(Node("runscript", {}, "", nodes, self.root.place), WORLD, self.problems)
         return Origin(*fields.angles(names[0], names[1]), fields.number(names[2]))
 

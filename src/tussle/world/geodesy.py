@@ -7,7 +7,7 @@ longitude would carry that difference into every later step.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -32,29 +32,38 @@ CENTRAL_SCALE, FALSE_EASTING, FALSE_NORTHING = 0.9996, 500_000.0, 10_000_000.0
 FORWARD_RIGHT_DOWN = 0.0, 1.0, 0.0, 0.0
 """Rotation from forward-right-down to forward-left-up body axes, and back: half a turn about the axis forward."""
 
+NOT_GIVEN: Any = None
+DEFAULT_PLACE = {"latitude": math.radians(29.0), "longitude": math.radians(-95.0), "altitude": 0.0}
+
 
 @dataclass(frozen=True)
 class Origin:
     """The point on Earth at which the world frame is tangent; z is measured from its altitude along its vertical.
 
-    The default is in Houston: the mission format documents it as latitude -95, longitude 29, which swaps the two numbers.
+    The default, 29 N, 95 W, is in Houston: the mission format documents it as latitude -95, longitude 29, which swaps the two numbers.
 
     Args:
         latitude: Geodetic latitude on WGS84, north positive [rad].
         longitude: East positive [rad].
         altitude: Height above the ellipsoid [m].
 
+    Attributes:
+        is_default: True if nothing is given, so that the world is nowhere on Earth for maps; the same place, given, is on them.
+
     Raises:
         ParameterError: A value is not finite, or an angle is out of range.
     """
 
-    latitude: float = math.radians(29.0)
-    longitude: float = math.radians(-95.0)
-    altitude: float = 0.0
+    latitude: float = NOT_GIVEN
+    longitude: float = NOT_GIVEN
+    altitude: float = NOT_GIVEN
+    is_default: bool = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        for name in ("latitude", "longitude", "altitude"):
-            value = float(getattr(self, name))
+        given = {name: getattr(self, name) for name in DEFAULT_PLACE}
+        object.__setattr__(self, "is_default", all(value is NOT_GIVEN for value in given.values()))
+        for name, default in DEFAULT_PLACE.items():
+            value = float(default if given[name] is NOT_GIVEN else given[name])
             if not math.isfinite(value):
                 raise ParameterError(f"Origin.{name} = {value!r} is not allowed; it takes a finite number")
             object.__setattr__(self, name, value)
@@ -121,11 +130,6 @@ class Origin:
         sine, cosine = rise / length, run / length
         altitude = axis * cosine + z * sine - SEMI_MAJOR * np.sqrt(1.0 - ECCENTRICITY_SQUARED * sine * sine)
         return np.stack([atan2(rise, run), atan2(y, x), altitude])
-
-    @property
-    def is_default(self) -> bool:
-        """True if it is the place of a mission that sets none."""
-        return self == Origin()
 
     @property
     def earth_centred(self) -> tuple[float, float, float]:

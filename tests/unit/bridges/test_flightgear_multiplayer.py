@@ -126,6 +126,15 @@ def test_blocks_with_one_callsign_have_different_ones(flightgear):
     assert [got["callsign"] for got in wait()] == ["syllo", "syllo2", "syllo3", "syllo4"] * 2
 
 
+def test_one_server_by_two_names_has_no_callsign_twice(flightgear):
+    port, wait = flightgear(4)
+    one = mission(server_port=port).blocks[0]
+    other = mission(server_port=port, server_ip="localhost").blocks[0].replace(name="other")
+    with Simulation(mission().replace(blocks=[one, other])) as sim:
+        sim.step()
+    assert [got["callsign"] for got in wait()] == ["syllo", "syllo2", "syllo3", "syllo4"]
+
+
 def test_callsigns_of_blocks_are_different_also_when_they_are_cut(flightgear):
     port, wait = flightgear(46)
     names = ["eagle1", "eagle12", "eagles", "eagles5", "eaglesx"]

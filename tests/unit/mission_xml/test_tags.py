@@ -9,6 +9,7 @@ import pytest
 
 from tussle import Simulation
 from tussle.errors import MissionError
+from tussle.mission import read_mission, to_python, to_xml
 from tussle.scene import Base, Origin
 from tussle.stock import (
     AvoidEntityMS,
@@ -42,6 +43,29 @@ def test_times_and_steps_and_their_defaults(files):
     assert (mission.start, mission.end, mission.dt, mission.motion_multiplier) == (0.0, 50.0, 0.00833333, 1)
     assert (mission.update, mission.end_conditions) == ("synchronous", ("time",))
     assert mission.scene.origin == Origin()
+
+
+@pytest.mark.parametrize(
+    ("tags", "is_default"),
+    [
+        ("", True),
+        ("<latitude_origin>29</latitude_origin><longitude_origin>-95</longitude_origin>", False),
+        ("<latitude_origin>29 deg</latitude_origin>", False),
+        ("<altitude_origin>0</altitude_origin>", False),
+    ],
+)
+def test_the_default_origin_is_one_where_it_is_given_and_stays_so_when_it_is_written(files, tags, is_default):
+    mission = files.world(tags).mission
+    assert (mission.scene.origin.latitude, mission.scene.origin.longitude) == (
+        math.radians(29),
+        math.radians(-95),
+    )
+    assert mission.scene.origin.is_default is is_default
+    (files.folder / "again.xml").write_text(to_xml(mission))
+    assert read_mission(files.folder / "again.xml").mission.scene.origin.is_default is is_default
+    names: dict = {"__name__": "built"}
+    exec(to_python(mission), names)
+    assert names["mission"].scene.origin == mission.scene.origin
 
 
 def test_an_end_between_two_steps_is_noted(files):

@@ -30,13 +30,21 @@ class Link:
 
     def __init__(self, port, name, points, speed, radius):
         self.name, self.points, self.speed, self.radius = name, list(points), speed, radius
-        self.values, self.received, self.community = {}, bytearray(), ""
-        self.socket = connected(port)
-        self.socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        self.socket.sendall(MAGIC + packet(message("i", "asynchronous", name)))
-        (((kind, _, _, _, self.community, _),),) = self.receive()
-        assert kind == "W", "not welcome"
+        self.values, self.community = {}, ""
+        while not self.is_welcome(
+            port
+        ):  # a MOOSDB may not have noticed yet that a helm of this name has gone
+            self.socket.close()
+            time.sleep(0.05)
         self.socket.sendall(packet(*(message("R", key, 0.0, name, self.community) for key in READS)))
+
+    def is_welcome(self, port):
+        """Connect and introduce the helm; returns whether the MOOSDB takes it."""
+        self.socket, self.received = connected(port), bytearray()
+        self.socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        self.socket.sendall(MAGIC + packet(message("i", "asynchronous", self.name)))
+        (((kind, _, _, _, self.community, _),),) = self.receive()
+        return kind == "W"
 
     def receive(self):
         """The messages of at least one packet."""

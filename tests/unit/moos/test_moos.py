@@ -6,7 +6,6 @@ import contextlib
 import math
 import os
 import re
-import shutil
 import signal
 import socket
 import subprocess
@@ -612,21 +611,3 @@ def test_ctrl_c_ends_a_run_that_waits_for_its_helm(database, tmp_path):
         process.communicate()
     while database.clients:
         time.sleep(0.01)
-
-
-def test_a_real_database_gives_the_bits_of_the_tests_own(tmp_path):
-    if not shutil.which("MOOSDB"):
-        pytest.skip("needs MOOSDB of MOOS-IvP on the PATH")
-    hashes = []
-    with MoosDatabase() as database:
-        port = database.port
-        hashes.append(played(database)[0][0].state_hash)
-    (tmp_path / "alpha.moos").write_text(f"ServerHost = localhost\nServerPort = {port}\nCommunity = alpha\n")
-    with open(tmp_path / "log", "w") as log:  # noqa: PTH123
-        process = subprocess.Popen(["MOOSDB", "alpha.moos"], cwd=tmp_path, stdout=log, stderr=log)
-    try:
-        hashes += [played(database)[0][0].state_hash for _ in range(2)]
-    finally:
-        process.kill()
-        process.wait()
-    assert len(set(hashes)) == 1

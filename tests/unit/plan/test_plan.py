@@ -179,7 +179,7 @@ def test_planners_of_ompl_propagate_with_the_motion_model(planner):
         ({"start": {"x": 44.5, "y": 50.0}}, "the start, .* is in an obstacle or less"),
         ({"start": {"x": -5.0}}, r"start: x = -5 is outside the bounds, 0 to 100"),
         ({"start": {"x": 1.0, "yaw": 7.0}}, "start: yaw = 7 is outside the bounds"),
-        ({"start": {"x": 1.0, "pitch": math.nan}}, "start: pitch = nan is not finite"),
+        ({"start": {"x": 1.0, "pitch": math.nan}}, "start: pitch = nan is not a finite number"),
         ({"goal": (1.0, math.inf, 0.0)}, "goal = .* it takes three finite numbers"),
         (
             {"goal": (50.0, 50.0, 0.0)},
@@ -191,6 +191,20 @@ def test_planners_of_ompl_propagate_with_the_motion_model(planner):
         ),
         ({"commands": {}}, "commands is empty; it takes one or more of speed, turn_rate"),
         ({"shortest": 3, "longest": 2}, "shortest <= longest"),
+        ({"goal_radius": math.inf}, "goal_radius = inf is not allowed; it takes a number > 0"),
+        ({"goal_radius": "3"}, "goal_radius = '3' is not allowed"),
+        ({"radius": math.nan}, "radius = nan is not allowed"),
+        ({"dt": math.inf}, "dt = inf is not allowed"),
+        ({"substeps": 1.5}, "substeps = 1.5 is not allowed; it takes a whole number from 1"),
+        ({"longest": math.inf}, "longest = inf is not allowed"),
+        ({"start": {"x": "a"}}, "start: x = 'a' is not a finite number"),
+        ({"start": {"x": None}}, "start: x = None is not a finite number"),
+        ({"goal": ("a", 1, 2)}, "goal = .* it takes three finite numbers"),
+        ({"goal": 5}, "goal = 5 is not allowed; it takes three finite numbers"),
+        ({"commands": {"speed": 5}}, "commands: speed = 5 is not allowed; it takes two finite numbers"),
+        ({"commands": {"speed": (1, 2, 3)}}, "commands: speed = .* two finite numbers in ascending order"),
+        ({"bounds": {"x": (0, 100), "y": ("a", "b")}}, "bounds: y = .* two finite numbers"),
+        ({"held": {"speed": math.nan}}, "held: speed = nan is not allowed"),
     ],
 )
 def test_problems_that_make_no_sense_are_refused(changes, error):
@@ -229,3 +243,19 @@ def test_wrong_options_are_refused():
         solve(problem(), cells={"z": 1.0})
     with pytest.raises(ParameterError, match="did you mean 'RRT'"):
         solve_with_ompl(problem(), "RTT")
+    for options, what in (({"cells": {"x": "a"}}, "cells: x"), ({"branches": 10**12}, "branches"), ({"batch": 7}, "batch"),
+                          ({"seed": -1}, "seed")):  # fmt: skip
+        with pytest.raises(ParameterError, match=f"{what} = .* is not allowed; it takes"):
+            solve(problem(), **options)
+    for options in ({"seconds": math.nan}, {"seconds": -1}, {"seed": 0}, {"planner": None}):
+        with pytest.raises(ParameterError, match="is not allowed"):
+            solve_with_ompl(problem(), **options)
+
+
+def test_numbers_of_numpy_are_numbers():
+    given = {
+        "goal": np.array([90.0, 10.0, 0.0]), "goal_radius": np.float64(3.0), "longest": np.int64(20),
+        "bounds": {"x": np.array([0.0, 100.0]), "y": [0, 100]}, "start": {"x": np.float64(10.0), "y": np.float32(10.0)},
+    }  # fmt: skip
+    asked = problem(**given, commands={"speed": (np.float64(2.0), 5)})
+    assert solve(asked, branches=np.int64(2000), seed=np.int64(1)).path.shape[1] == 5

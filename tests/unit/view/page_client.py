@@ -28,6 +28,7 @@ class PageClient:
         curves: (name, team, id) -> [time, value] of each change.
         results: Names of the results of metrics and interactions.
         refusals: Why values were not taken.
+        n_undriven: How often it was told that it may not drive.
         n_frames: Frames that were received.
         n_bytes: All that was received.
         error: Code with which the server closed the socket; None while it is open.
@@ -43,7 +44,7 @@ class PageClient:
         self.refusals: list[str] = []
         self.drawn: dict = {}
         self.past: list = []
-        self.n_frames = self.n_bytes = 0
+        self.n_frames = self.n_bytes = self.n_undriven = 0
         self.error: int | None = None
         self._url, self._is_reading, self._is_counting = url, is_reading, is_counting
         self._is_open = threading.Event()
@@ -88,6 +89,7 @@ class PageClient:
             events = self.status["events"]
             self.events[events["from"] :] = events["rows"]
             self.refusals += [self.status["refusal"]] if self.status["refusal"] else []
+            self.n_undriven += self.status["isDriveRefused"]
             return
         (length,) = struct.unpack_from("<I", data)
         header, body = json.loads(data[4 : 4 + length]), data[4 + length :]

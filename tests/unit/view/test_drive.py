@@ -3,12 +3,13 @@
 import numpy as np
 import pytest
 
-from tussle import Block, Mission, Recorder, Simulation
+from tussle import Block, Mission, Recorder, Simulation, stock
 from tussle.api import Autonomy, Output, State
+from tussle.engine.manual import axes_of
 from tussle.messages import ManualControl
-from tussle.mission import mission_of
+from tussle.mission import mission_of, read_mission
 from tussle.record import load_inputs
-from tussle.stock import SimpleCar, SingleIntegrator, Still, Straight, Unicycle, UnicyclePID
+from tussle.stock import DoubleIntegrator, SimpleCar, SingleIntegrator, Still, Straight, Unicycle, UnicyclePID
 from tussle.view import Live
 
 
@@ -171,6 +172,61 @@ def test_death_and_a_reset_let_go(live):
     assert not live.simulation.state.manual
 
 
+MODELS = [
+    name
+    for name, path in stock.examples().items()
+    if "motion" in path.parts and not name.startswith("JSBSim")
+]
+
+
+def driven(name, sticks, seconds):
+    """Drive the first entity of the first block of an example that can be driven; returns it and its yaws, or None."""
+    mission = read_mission(stock.examples()[name]).mission.replace(end=1e4, interactions=())
+    with Simulation(mission, 1) as simulation, Live(simulation, threaded=False, is_paused=True) as live:
+        live.step(2)
+        group = next((g for g in simulation.state.population.groups if g.n and axes_of(g)), None)
+        if group is None:
+            return None
+        who = int(simulation.state.population.bodies.id[group.first])
+        live.drive(who, sticks)
+        yaws = []
+        while live.t < seconds:
+            live.step(1)
+            yaws.append(float(simulation.read(f"{group.name}.yaw")[0][0, 0]))
+        assert not live.notes
+        assert live.entity(who).is_driven
+        return live.entity(who), np.unwrap(yaws)
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_every_model_that_ships_flies_where_the_sticks_are_in_the_middle_and_ahead(name):
+    slow, fast = (driven(name, sticks, 2.0) for sticks in ((0, 0, 0), (1, 0, 0)))
+    if slow is None:
+        assert name in {"Ballistic", "External", "FreeBody", "HarmonicOscillator", "Still"}
+        return
+    speeds = [float(np.linalg.norm(each.body["vel"].value)) for each, _ in (slow, fast)]
+    assert np.isfinite(speeds).all()
+    assert speeds[0] <= speeds[1]
+    assert speeds[1] > 0.3
+
+
+@pytest.mark.parametrize("name", ["FixedWing6DOF", "DubinsAirplane3D", "DubinsAirplane"])
+def test_an_aircraft_does_not_stall_where_nobody_touches_the_sticks(name):
+    """Without a lowest speed its speed is that which its autonomy wants; half a stick is a quarter more or less."""
+    slow, middle, fast = (driven(name, (stick, 0, 0), 10.0)[0] for stick in (-1, 0, 1))
+    before, there, after = (float(np.linalg.norm(each.body["vel"].value)) for each in (slow, middle, fast))
+    assert there > 15.0
+    assert before < there < after
+
+
+@pytest.mark.parametrize("name", ["Multirotor", "SimpleQuadrotor"])
+def test_who_moves_sideways_does_not_spin(name):
+    entity, yaws = driven(name, (0, 1, 0), 5.0)
+    assert entity.body["vel"].value[0] < -0.5
+    assert np.abs(yaws - yaws[0]).max() < 0.3
+    assert all("desired_heading" not in channels for channels in entity.axes.values())
+
+
 @pytest.mark.parametrize("update", ["synchronous", "sequential"])
 def test_velocities_are_driven_north_and_west(update):
     class Still0(Autonomy):
@@ -179,6 +235,19 @@ def test_velocities_are_driven_north_and_west(update):
         def step(self, g):
             self.velocity[:] = 0.0
 
+    class Turns(Autonomy):
+        acceleration = Output("acceleration_x acceleration_y acceleration_z", unit="m/s^2")
+        turn_rate = Output(unit="rad/s")
+
+        def step(self, g):
+            self.acceleration[:], self.turn_rate[:] = 0.0, 0.5
+
+    top = Block(name="top", position=(90, 0, 0), autonomy=Turns(), motion=DoubleIntegrator())
+    with Simulation(Mission(blocks=[top], end=9.0, dt=0.1, update=update), 1) as simulation:
+        simulation.publish(ManualControl, entity=1, is_on=True, sticks=np.array([0.0, 1.0, 0.0]))
+        simulation.step(5)
+        assert simulation.read("top.vel")[0][0, 0, 0] < -0.3
+        assert axes_of(simulation.state.population.groups[0])["left"] == ["acceleration_x"]
     block = Block(name="dot", autonomy=Still0(), motion=SingleIntegrator(max_speed=5.0))
     with Simulation(Mission(blocks=[block], end=9.0, dt=0.1, update=update), 1) as simulation:
         simulation.publish(ManualControl, entity=1, is_on=True, sticks=np.array([1.0, 0.0, 0.0]))

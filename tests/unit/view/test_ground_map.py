@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import copy
 import math
+import pickle
 import struct
 import sys
 import zlib
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -212,6 +215,20 @@ def refused(tmp_path):
 def test_a_mission_without_an_origin(refused):
     origin = Origin()
     refused("no origin.*latitude_origin", where=Area(origin, (-10.0, -10.0), (10.0, 10.0), 0.0))
+
+
+def test_the_default_place_is_an_origin_where_it_is_given(tmp_path):
+    (tmp_path / "m.png").write_bytes(encoded(coded()))
+    given = Origin.from_degrees(29.0, -95.0)
+    over = GroundMap(tmp_path / "m.png", (-95.1, 28.9, -94.9, 29.1)).over(
+        Area(given, (-10.0, -10.0), (10.0, 10.0), 0.0)
+    )
+    assert over is not None
+    assert given != Origin()
+    assert not copy.deepcopy(given).is_default
+    assert not pickle.loads(pickle.dumps(given)).is_default
+    assert pickle.loads(pickle.dumps(Origin())).is_default
+    assert not replace(given, altitude=3.0).is_default
 
 
 @pytest.mark.parametrize(

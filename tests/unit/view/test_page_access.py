@@ -234,6 +234,18 @@ def test_one_browser_that_sends_without_end_is_slowed_down(live, client):
     client.order("warp", value=5)
     client.wait(lambda: live.warp == 5.0)
     assert time.monotonic() - began > 1.5
+    told = "this page sends more than 200 messages a second; the further ones wait"
+    assert 1 <= client.refusals.count(told) == len(client.refusals) <= 5
+
+
+def test_one_who_sends_much_but_not_too_much_is_told_nothing(live, client):
+    for _ in range(3):
+        for i in range(MAX_MESSAGES // 2):
+            client.order("warp", value=1 + i % 2)
+        time.sleep(0.6)
+    client.order("warp", value=6)
+    client.wait(lambda: live.warp == 6.0)
+    assert client.refusals == []
 
 
 # -- where it is served -----------------------------------------------------------------------------------------------------------

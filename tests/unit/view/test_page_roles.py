@@ -1,6 +1,7 @@
 """What each address of a page may do: everything, orders to a team, or watching."""
 
 import re
+import time
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from tussle import Block, Mission, Simulation
 from tussle.errors import ParameterError
 from tussle.stock import GoTo, SingleIntegrator
 from tussle.view import Live
+from tussle.view.page import publisher
 from tussle.view.page.access import OPERATE, WATCH, PageRole
 from tussle.view.page.server import Page
 
@@ -117,7 +119,8 @@ def test_an_operator_gives_orders_to_the_own_team(page):
     assert not live.simulation.read("red.GoTo.is_told")[0].any()
 
 
-def test_an_operator_drives_an_entity_until_the_browser_goes(page):
+def test_an_operator_drives_an_entity_until_the_browser_goes(page, monkeypatch):
+    monkeypatch.setattr(publisher, "DRIVE_LEASE", 600.0)
     live, page = page
     driven = lambda: {who for _, who in live.simulation.state.manual}  # noqa: E731
 
@@ -136,6 +139,12 @@ def test_an_operator_drives_an_entity_until_the_browser_goes(page):
             refused(other, "drive", {"entities": [3], "sticks": [0.0, 0.0, 0.0]})
             == "another browser drives entity 3"
         )
+        assert other.n_undriven >= 1
+        refused(client, "order", {"receivers": [1], **ORDER})
+        client.wait(lambda: client.n_frames)
+        assert (
+            client.n_undriven == 0
+        )  # another order that is refused says nothing of the entity that it drives
         for sticks in ([2.0, 0.0, 0.0], [1.0, 0.0], "north"):
             assert refused(client, "drive", {"entities": [3], "sticks": sticks}).startswith("sticks")
         client.order("drive", entities=[4], sticks=[1.0, 0.0, 0.0])
@@ -146,6 +155,34 @@ def test_an_operator_drives_an_entity_until_the_browser_goes(page):
         other.wait(wait_for({4}))
         client.close()
         other.wait(wait_for(set()))
+
+
+def test_a_driver_who_falls_silent_gives_the_entity_back_and_one_who_repeats_the_sticks_does_not(
+    page, monkeypatch
+):
+    """As a browser whose connection is lost without an end."""
+    monkeypatch.setattr(publisher, "DRIVE_LEASE", 1.0)
+    live, page = page
+    givers = []
+    live.simulation.events.inputs.append(lambda world, given: givers.append(given.by))
+    with PageClient(page.addresses[PageRole(OPERATE, 2)]) as client, PageClient(page.url) as other:
+        client.wait(lambda: client.status)
+        for _ in range(10):
+            client.order("drive", entities=[3], sticks=[1.0, 0.0, 0.0])
+            live.step(1)
+            time.sleep(0.2)
+        assert live.settle()
+        assert client.n_undriven == 0
+        assert {who for _, who in live.simulation.state.manual} == {3}
+        assert len(live.injections) == 1  # what is repeated is no input
+        client.wait(lambda: client.n_undriven)
+        assert client.refusals == ["entity 3 is given back: nothing came from this page for 1 s"]
+        live.step(1)
+        assert live.settle()
+        assert not live.simulation.state.manual
+        assert givers == ["operate team 2"] * 2
+        other.order("drive", entities=[3], sticks=[0.0, 1.0, 0.0])
+        other.wait(lambda: len(live.injections) == 3)
 
 
 def test_one_steers_is_the_first_of_those_who_may(page):

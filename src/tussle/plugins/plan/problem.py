@@ -10,10 +10,21 @@ from typing import Any
 import numpy as np
 
 from tussle.api import MotionModel
+from tussle.documents import POSITIVE, Checked, Either, Real, Whole, check_argument, problem
 from tussle.errors import ParameterError, listed, nearest_name
 from tussle.world.scene import Scene
 
 POSITION = ("x", "y", "z")
+MAX_STEPS = 10**6
+"""Largest number of steps of a command, and of substeps."""
+THREE = Either(
+    (Checked([Real()], lambda numbers, _: "" if len(numbers) == 3 else "their number"),),
+    "three finite numbers",
+)
+RANGE = Either(
+    (Checked([Real()], lambda ends, _: "" if len(ends) == 2 and ends[0] <= ends[1] else "their order"),),
+    "two finite numbers in ascending order",
+)
 GOAL_TICKS = 11
 """Places along a diameter of the goal at which obstacles are looked for; odd, so that its center is one."""
 
@@ -69,28 +80,31 @@ class Problem:
         if not self.commands:
             raise ParameterError(f"commands is empty; it takes one or more of {', '.join(self.inputs)}")
         for owner, ranges in (("bounds", self.bounds), ("commands", self.commands)):
-            for key, (low, high) in ranges.items():
-                if not (np.isfinite([low, high]).all() and low <= high):
-                    raise ParameterError(
-                        f"{owner}: {key} = {(low, high)}; two finite numbers in ascending order"
-                    )
+            for key, ends in ranges.items():
+                check_argument(f"{owner}: {key}", _as_list(ends), RANGE)
+        for key, value in self.held.items():
+            check_argument(f"held: {key}", value, Real())
         if not {"x", "y"} <= set(self.bounds):
             raise ParameterError("bounds of x and y are missing")
-        if np.shape(self.goal) != (3,) or not np.isfinite(self.goal).all():
-            raise ParameterError(f"goal = {self.goal!r} is not allowed; it takes three finite numbers")
-        if not (self.goal_radius > 0.0 and self.radius >= 0.0 and self.dt > 0.0):
-            raise ParameterError("goal_radius and dt must be > 0, and radius >= 0")
-        if not 1 <= self.shortest <= self.longest or self.substeps < 1:
-            raise ParameterError("1 <= shortest <= longest and substeps >= 1 are required")
+        check_argument("goal", _as_list(self.goal), THREE)
+        numbers = {"goal_radius": POSITIVE, "radius": Real(0.0), "dt": POSITIVE}
+        counts = dict.fromkeys(("shortest", "longest", "substeps"), Whole(1, MAX_STEPS))
+        for key, rule in (numbers | counts).items():
+            check_argument(key, getattr(self, key), rule)
+        if self.shortest > self.longest:
+            raise ParameterError(
+                f"shortest <= longest is required; they are {self.shortest} and {self.longest}"
+            )
         self._check_start()
         self._check_goal()
 
     def _check_start(self) -> None:
         """Raise a `ParameterError` if no plan can begin at the start."""
+        for name, given in self.start.items():
+            if problem(given.item() if isinstance(given, np.generic) else given, Real()):
+                raise ParameterError(f"start: {name} = {given!r} is not a finite number")
         for name, value in zip(self.fields, self.first.tolist(), strict=True):
             low, high = self.bounds.get(name, (-np.inf, np.inf))
-            if not np.isfinite(value):
-                raise ParameterError(f"start: {name} = {value} is not finite")
             if not low <= value <= high:
                 raise ParameterError(f"start: {name} = {value:g} is outside the bounds, {low:g} to {high:g}")
         if not self.is_allowed(self.first[:, None])[0]:
@@ -211,6 +225,13 @@ class Problem:
         goal = np.reshape(self.goal, (3,) + (1,) * (x.ndim - 1))
         gap: np.ndarray = np.sqrt(((x[self.position] - goal) ** 2).sum(axis=0))
         return gap
+
+
+def _as_list(numbers: Any) -> Any:
+    """A list of plain numbers of a sequence; anything else as it is."""
+    if not isinstance(numbers, (tuple, list, np.ndarray)):
+        return numbers
+    return [each.item() if isinstance(each, np.generic) else each for each in numbers]
 
 
 @dataclass(frozen=True)

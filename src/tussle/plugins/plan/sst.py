@@ -11,7 +11,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from tussle.errors import ParameterError
+from tussle.documents import POSITIVE, Whole, check_argument
 from tussle.plugins.plan.kernels import admit, select
 from tussle.plugins.plan.problem import POSITION, Plan, Problem
 
@@ -21,6 +21,8 @@ TOWARD_GOAL = 0.05
 """Fraction of the samples whose position is the goal."""
 COMMANDS_PER_NODE = 8
 """Commands that are tried from each selected node."""
+MAX_BRANCHES = 10**8
+"""Largest number of commands to try, for each of which memory is taken."""
 
 
 class Tree:
@@ -114,8 +116,9 @@ def solve(
     Raises:
         ParameterError: A value is not allowed.
     """
-    if branches < 1 or batch < COMMANDS_PER_NODE:
-        raise ParameterError(f"branches >= 1 and batch >= {COMMANDS_PER_NODE} are required")
+    check_argument("seed", seed, Whole())
+    check_argument("branches", branches, Whole(1, MAX_BRANCHES))
+    check_argument("batch", batch, Whole(COMMANDS_PER_NODE, MAX_BRANCHES))
     sizes = _cell_sizes(problem, cells or {})
     if problem.is_at_goal:
         return problem.empty_plan()
@@ -145,8 +148,7 @@ def _cell_sizes(problem: Problem, cells: Mapping[str, float]) -> np.ndarray:
     sizes = []
     for name, (low, high) in problem.bounds.items():
         size = cells.get(name, (high - low) / (50 if name in POSITION else 8) or 1.0)
-        if not (np.isfinite(size) and size > 0.0):
-            raise ParameterError(f"cells: {name} = {size!r} is not allowed; it takes a number > 0")
+        check_argument(f"cells: {name}", size, POSITIVE)
         sizes.append(size)
     return np.array(sizes)
 

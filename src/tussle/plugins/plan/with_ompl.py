@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from tussle.errors import MissingExtraError, ParameterError, listed, nearest_name
+from tussle.documents import Real, Whole, check_argument
+from tussle.errors import MissingExtraError
 from tussle.plugins.plan.problem import Plan, Problem
 
 PLANNERS = ("RRT", "KPIECE1", "EST")
@@ -37,10 +38,9 @@ def solve_with_ompl(problem: Problem, planner: str = "RRT", *, seed: int = 1, se
         from ompl import base, control, util
     except ImportError:
         raise MissingExtraError("solve_with_ompl needs OMPL: pip install 'tussle[plan]'") from None
-    if planner not in PLANNERS:
-        raise ParameterError(
-            f"planner = {planner!r} is not allowed{nearest_name(planner, PLANNERS)}; {listed(PLANNERS)}"
-        )
+    check_argument("planner", planner, PLANNERS)
+    check_argument("seed", seed, Whole(1, 2**32 - 1))
+    check_argument("seconds", seconds, Real(0.0))
     if problem.is_at_goal:
         return problem.empty_plan()
     util.setLogLevel(util.LogLevel.LOG_NONE)

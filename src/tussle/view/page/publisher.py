@@ -52,10 +52,13 @@ STATUS_PERIOD = 0.25
 """Period at which numbers, notes, events and the chosen entity are sent [s]."""
 MAX_MESSAGES = 200
 """Largest number of messages per second that are read from one browser; further ones wait."""
+TOO_MANY = f"this page sends more than {MAX_MESSAGES} messages a second; the further ones wait"
 MAX_EVENTS = 2000
 """Largest number of events in one message."""
 MAX_CHANGES = 5000
 """Number of changes at which a message is full; those of one quantity are sent together."""
+DRIVE_LEASE = 10.0
+"""Time after which an entity is given back if its driver's browser, which repeats its sticks each second, is silent [s]."""
 REFUSAL_PERIOD = 1.0
 """Least time between two messages about refused values [s]."""
 PAST_FRAMES, PAST_STATES = 120, 60_000
@@ -73,6 +76,7 @@ class Reader:
         chosen: Id of the entity whose state it reads; 0 for nobody.
         has_feed: It reads the messages of the game.
         driven: Id of the entity that it drives; 0 for none.
+        sticks: Those that it has sent last, and when.
         wake: There is something to be sent.
     """
 
@@ -81,6 +85,7 @@ class Reader:
         self.chosen = 0
         self.has_feed = False
         self.driven = 0
+        self.sticks: tuple[list[float], float] = [], 0.0
         self.wake = asyncio.Event()
         self.wake.set()
         self.frame_sent = self.drawn_sent = 0
@@ -88,6 +93,7 @@ class Reader:
         self.is_due = False
         self.past: deque[bytes] = deque(maxlen=MAX_LOOKS)
         self.refusal: str | None = None
+        self.is_drive_refused = False
         self.refused_at = -REFUSAL_PERIOD
         self.events_sent: list[Event] = []
         self.wanted: frozenset[tuple[str, int]] = frozenset()
@@ -162,6 +168,7 @@ class FramePublisher:
             is_needed = bool(self.readers) or self._live.see > 0.0
             if is_needed:
                 with self._failures.caught():
+                    self._end_leases()
                     self._look()
                     self._make_frame()
                 with self._failures.caught():
@@ -218,7 +225,9 @@ class FramePublisher:
             while not socket.closed:
                 now = time.monotonic()
                 reader.free_at = max(reader.free_at, now - 1.0) + 1.0 / MAX_MESSAGES
-                await asyncio.sleep(max(0.0, reader.free_at - now))
+                if reader.free_at > now:
+                    self._refuse(reader, TOO_MANY)
+                    await asyncio.sleep(reader.free_at - now)
                 received = await socket.receive()
                 if received.data is None or socket.closed:
                     break
@@ -267,6 +276,7 @@ class FramePublisher:
         live, seen = self._live, self._seen.now
         result = seen.details.result
         refusal, reader.refusal = reader.refusal, None
+        is_drive_refused, reader.is_drive_refused = reader.is_drive_refused, False
         warp = live.warp
         error = live.error
         now = time.monotonic()
@@ -277,7 +287,7 @@ class FramePublisher:
             "rate": sum(now - moment <= 1.0 for moment in self._moments),
             "notes": [*live.notes, *self._drawing_notes, *self._failures.texts], "error": None if error is None else str(error),
             "metrics": [] if result is None else result_rows(result, live.teams), "events": self._new_events(reader),
-            "entity": self._entity(reader), "refusal": refusal, "steers": self._may_steer(reader),
+            "entity": self._entity(reader), "refusal": refusal, "isDriveRefused": is_drive_refused, "steers": self._may_steer(reader),
             "role": asdict(reader.role),
             "feed": feed_rows(seen.details.feed) if reader.has_feed else None,
             "alarms": [
@@ -399,15 +409,17 @@ class FramePublisher:
             ),
         }
         with self._failures.caught():
+            name = ""
             try:
                 read = read_command(text, commands)
                 if read is None:
                     return
-                command = commands[read[0]]
-                self._check_role(reader, command, read[1])
-                command.do(**read[1])
+                name, given = read
+                self._check_role(reader, commands[name], given)
+                commands[name].do(**given)
             except ParameterError as error:
                 self._refuse(reader, str(error))
+                reader.is_drive_refused |= name == "drive"
             for each in self.readers:
                 each.status_due = 0.0
 
@@ -422,9 +434,22 @@ class FramePublisher:
             raise ParameterError(f"another browser drives entity {who}")
         if reader.driven not in (0, who):
             self._live.drive(reader.driven, None)
-        reader.driven = who
-        if who:
+        is_new = reader.driven != who or reader.sticks[0] != sticks
+        reader.driven, reader.sticks = who, (sticks or [], time.monotonic())
+        if who and is_new:
             self._live.drive(who, sticks)
+
+    def _end_leases(self) -> None:
+        """Give entities back whose drivers are silent: a connection can be lost without an end."""
+        for reader in self.readers:
+            if reader.driven and time.monotonic() - reader.sticks[1] > DRIVE_LEASE:
+                self._refuse(
+                    reader,
+                    f"entity {reader.driven} is given back: nothing came from this page for {DRIVE_LEASE:g} s",
+                )
+                reader.is_drive_refused = True
+                with given_by(str(reader.role)):
+                    self._drive(reader, [], None)
 
     def _refuse(self, reader: Reader, reason: str) -> None:
         """Report a rejected value; of consecutive ones, only the first."""

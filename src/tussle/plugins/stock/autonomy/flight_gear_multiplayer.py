@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import socket
-from functools import partial
 from itertools import chain, count
 
 import numpy as np
@@ -33,20 +32,29 @@ class Senders:
     """The socket of a simulation, and the callsigns of its entities.
 
     Attributes:
-        place: Address and port to which packets go.
         socket: The socket.
     """
 
-    def __init__(self, address: str, port: int) -> None:
-        try:
-            self.place = socket.gethostbyname(address), port
-        except (OSError, UnicodeError) as reason:
-            raise ParameterError(
-                f"FlightGearMultiplayer: server_ip = {address!r} is no known host: {reason}"
-            ) from None
+    def __init__(self) -> None:
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._addresses: dict[str, str] = {}
         self._callsigns: dict[int, str] = {}
         self._taken: set[str] = set()
+
+    def address(self, host: str) -> str:
+        """The address of a host, which is looked up once.
+
+        Raises:
+            ParameterError: There is none.
+        """
+        if host not in self._addresses:
+            try:
+                self._addresses[host] = socket.gethostbyname(host)
+            except (OSError, UnicodeError) as reason:
+                raise ParameterError(
+                    f"FlightGearMultiplayer: server_ip = {host!r} is no known host: {reason}"
+                ) from None
+        return self._addresses[host]
 
     def callsign(self, id_: int, given: str) -> bytes:
         """The callsign of an entity, which no other one has: as it is given, or with the id, else the next free number, at its end."""
@@ -96,16 +104,16 @@ class FlightGearMultiplayer(Autonomy):
     def step(self, g: GroupView) -> None:
         """Send the entities of the first world."""
         rows = np.flatnonzero(g.world == 0)
-        place = self.server_ip, self.server_port
-        senders: Senders = g.context.share((FlightGearMultiplayer, *place), partial(Senders, *place))
+        senders: Senders = g.context.share(FlightGearMultiplayer, Senders)
+        place = senders.address(self.server_ip), self.server_port
         if not len(rows):
             return
         for packet in self._packets(g, rows, senders):
             try:
-                senders.socket.sendto(packet.tobytes(), senders.place)
+                senders.socket.sendto(packet.tobytes(), place)
             except OSError as reason:
                 raise ParameterError(
-                    f"FlightGearMultiplayer: server_ip = {place[0]!r}, port {place[1]}: {reason.strerror}"
+                    f"FlightGearMultiplayer: server_ip = {self.server_ip!r}, port {place[1]}: {reason.strerror}"
                 ) from None
 
     def _packets(self, g: GroupView, rows: np.ndarray, senders: Senders) -> np.ndarray:

@@ -8,6 +8,8 @@ import { Live } from './live.js';
 
 /** Steps of a stick from its middle to its end. */
 const STEPS = 127;
+/** Time after which sticks are sent again that have not changed, since silence gives the entity back [ms]. */
+const REPEAT = 1000;
 /** Deflection of a gamepad below which it rests. */
 const REST = 0.12;
 /** Key -> axis and deflection. @type {Record<string, [number, number]>} */
@@ -31,12 +33,19 @@ export class Drive {
     /** Channels of the entity that is driven. @type {string[]} */
     this.channels = [];
     this.sent = '';
+    this.sentAt = 0;
     /** @type {Set<string>} */
     this.held = new Set();
     // Before the keys of the page, which mean something else meanwhile.
     document.addEventListener('keydown', (event) => this.press(event), true);
     document.addEventListener('keyup', ({ key }) => this.held.delete(key.toLowerCase()), true);
-    window.addEventListener('blur', () => this.held.clear());
+    // At once: a page that is hidden draws no more frames.
+    window.addEventListener('blur', () => {
+      this.held.clear();
+      this.update();
+    });
+    document.addEventListener('visibilitychange', () => this.update());
+    setInterval(() => this.update(), REPEAT / 2);
   }
 
   /** What is known of the chosen entity, if this address may drive it. */
@@ -44,6 +53,17 @@ export class Drive {
     const { layer, chosen, orders } = this.player;
     const entity = layer instanceof Live && !layer.status.isOver ? layer.status.entity : null;
     return entity?.id === chosen && layer.slotOf(chosen) >= 0 && orders.may(chosen) && Object.keys(entity.axes).length ? entity : null;
+  }
+
+  /** Why nothing is driven. */
+  get obstacle() {
+    const { layer, chosen, orders } = this.player;
+    if (!(layer instanceof Live)) return 'Only a live game has entities that are driven';
+    if (layer.status.isOver) return 'The game is over: nobody is driven';
+    if (!chosen || layer.slotOf(chosen) < 0) return 'Click the entity that you want to drive';
+    if (!orders.may(chosen)) return `This address may not drive ${layer.who(chosen)}`;
+    if (layer.status.entity?.id !== chosen) return `${layer.who(chosen)} is still being read: try again`;
+    return `${layer.who(chosen)} has no channel that keys can drive`;
   }
 
   show() {
@@ -69,7 +89,7 @@ export class Drive {
       this.sent = '';
       this.held.clear();
       player.say(`You drive ${player.layer.who(this.who)}`);
-    }
+    } else player.say(this.obstacle);
     player.look();
   }
 
@@ -106,14 +126,16 @@ export class Drive {
     }
     const sticks = this.sticks(this.channels).map((x) => Math.round(STEPS * between(x, -1, 1)) / STEPS + 0);
     const text = sticks.join();
-    if (text === this.sent) return;
+    if (text === this.sent && performance.now() - this.sentAt < REPEAT) return;
     this.sent = text;
+    this.sentAt = performance.now();
     player.order('drive', { entities: [who], sticks });
   }
 
   /** Deflections ahead, left and up. @param {string[]} channels */
   sticks(channels) {
     const sum = [0, 0, 0];
+    if (document.hidden) return sum;
     for (const key of this.held) sum[STICK_KEYS[key][0]] += STICK_KEYS[key][1];
     for (const pad of navigator.getGamepads?.() ?? []) {
       [1, 0, 3].forEach((axis, i) => { if (Math.abs(pad?.axes[axis] ?? 0) > REST) sum[i] -= pad.axes[axis]; });

@@ -159,10 +159,8 @@ export class Player {
   /** @param {Status} status */
   takeStatus(status) {
     if (!this.isLost) this.panels.showStatus(status, this.drawRate);
-    if (status.refusal) {
-      this.drive.release();
-      this.say(status.refusal);
-    }
+    if (status.isDriveRefused) this.drive.release();
+    if (status.refusal) this.say(status.refusal);
     this.look();
   }
 

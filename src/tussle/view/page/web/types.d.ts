@@ -46,7 +46,7 @@ export interface PageData {
 export interface Status {
   t: number; step: number; span: [number, number]; epoch: number; seed: number; isPaused: boolean; isOver: boolean; isSeeking: boolean;
   warp: number | null; reached: number; rate: number; notes: string[]; error: string | null; metrics: [string, string][];
-  events: { from: number; rows: EventRow[] }; refusal: string | null; steers: boolean; role: { kind: 'direct' | 'operate' | 'watch'; team: number | null; name: string };
+  events: { from: number; rows: EventRow[] }; refusal: string | null; isDriveRefused: boolean; steers: boolean; role: { kind: 'direct' | 'operate' | 'watch'; team: number | null; name: string };
   /** Topic, messages a second of the game, and the last message; null where it was not asked for. */
   feed: [string, number, string][] | null;
   alarms: SpecificationState[];
