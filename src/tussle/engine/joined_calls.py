@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from bisect import bisect
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 from tussle.api.group import GroupView
 from tussle.engine import failure
 from tussle.engine.calls import Call
 from tussle.engine.state import SimulationState
-from tussle.numeric.replay import Replay, recording
+from tussle.errors import PluginError
+from tussle.numeric.replay import Replay, may_be_repeated, recording
 
 WORTH = 20.0
 """Number of steps for which rows stay the same on average, from which on it is worth packing arguments early."""
@@ -25,11 +28,13 @@ class Joined:
         replay: All kernels.
         ends: Number of kernels up to the end of each call.
         later: For each call, what Python does after its kernels: view, plugin and function.
+        callers: For each call, its view and plugin.
     """
 
     replay: Replay
     ends: list[int]
     later: list[list[tuple[GroupView, object, Callable[[], None]]]]
+    callers: list[tuple[GroupView, object]]
 
 
 class JoinedCalls:
@@ -70,7 +75,11 @@ class JoinedCalls:
             view.kept[self] = True
 
     def _replay(self, joined: Joined) -> None:
-        done = joined.replay.run()
+        try:
+            done = joined.replay.run()
+        except Exception as error:
+            view, plugin = joined.callers[bisect(joined.ends, int(joined.replay.at[0]))]
+            raise self._failed(error, plugin, view) from error
         bodies = self.state.population.bodies
         bodies.touch(0, bodies.n)
         for end, later, call in zip(joined.ends, joined.later, self.calls, strict=True):
@@ -82,13 +91,16 @@ class JoinedCalls:
                 try:
                     function()
                 except Exception as error:
-                    group = next(g for g in self.state.population.groups if view in g.views)
-                    raise failure.in_call(error, plugin, view, group) from error
+                    raise self._failed(error, plugin, view) from error
+
+    def _failed(self, error: Exception, plugin: object, view: GroupView) -> PluginError:
+        group = next(g for g in self.state.population.groups if view in g.views)
+        return failure.in_call(error, plugin, view, group)
 
     def _record(self) -> None:
         bodies, context = self.state.population.bodies, self.state.context
         bodies.touch(0, bodies.n)
-        ends, later = [], []
+        ends, later, callers = [], [], []
         try:
             with recording() as recorded:
                 for call in self.calls:
@@ -96,10 +108,16 @@ class JoinedCalls:
                     call.run()
                     ends.append(len(recorded.calls))
                     later.append(context.later)
+                    callers.append((call.views[0], call.views[0]._caller))
         finally:
             context.later = None
-        if recorded.is_whole and ends[-1]:
-            self.views[0].kept[self] = Joined(Replay(recorded.calls), ends, later)
+        calls = recorded.calls
+        are_repeatable = all(
+            may_be_repeated(calls[a:b], "motion" in call.names)
+            for (a, b), call in zip(pairwise([0, *ends]), self.calls, strict=True)
+        )
+        if recorded.is_whole and calls and are_repeatable:
+            self.views[0].kept[self] = Joined(Replay(calls), ends, later, callers)
             self.n_refused = 0
         else:
             self.n_refused += 1
