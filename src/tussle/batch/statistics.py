@@ -89,8 +89,8 @@ class PairedComparison:
         a: The reference.
         b: What is compared.
         n: Pairs.
-        mean_a: Mean of a's runs.
-        mean_b: Mean of b's runs.
+        mean_a: Mean of a's runs; over several points, of the points' means.
+        mean_b: Mean of b's runs, likewise.
         difference: mean_b - mean_a.
         low: Lower end of the interval of the difference.
         high: Its upper end.
@@ -447,7 +447,10 @@ def paired_difference(
     n_greater, n_less = int((more > 0.0).sum()), int((more < 0.0).sum())
     mean = mean_of(quantity, more, own, strata, are_copies=are_copies)
     signs = np.sign(more if own is None or not are_copies else more[np.unique(own, return_index=True)[1]])
-    mean_a, mean_b = (float(v.mean()) if len(v) else math.nan for v in (a, b))
+    mean_a, mean_b = (
+        math.nan if not len(v) else float(v.mean()) if strata is None else _over_strata(v, strata)[0]
+        for v in (a, b)
+    )
     return PairedComparison(
         quantity, *names, len(more), mean_a, mean_b, mean.value, mean.low, mean.high,
         n_greater, n_less, len(more) - n_greater - n_less,
