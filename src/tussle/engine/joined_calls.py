@@ -6,13 +6,14 @@ from bisect import bisect
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Any
 
 from tussle.api.group import GroupView
 from tussle.engine import failure
 from tussle.engine.calls import Call
 from tussle.engine.state import SimulationState
 from tussle.errors import PluginError
-from tussle.numeric.replay import Replay, may_be_repeated, recording
+from tussle.numeric.replay import Replay, are_same, may_be_repeated, recording
 
 WORTH = 20.0
 """Number of steps for which rows stay the same on average, from which on it is worth packing arguments early."""
@@ -40,8 +41,9 @@ class Joined:
 class JoinedCalls:
     """Consecutive calls of a schedule that end with a motion model.
 
-    While rows stay the same, each step calls the same kernels with the same arguments. They are recorded in one step, in which
-    all that is kept for the current positions is computed again, and called by `Replay` from then on.
+    While rows stay the same, each step calls the same kernels with the same arguments. They are recorded in two steps, in which
+    all that is kept for the current positions is computed again, and called by `Replay` from then on. Where the second step's
+    arguments are others, the calls are not joined. Once they have been the same, one step is recorded whenever rows have changed.
     """
 
     def __init__(self, state: SimulationState, calls: Sequence[Call]) -> None:
@@ -49,6 +51,8 @@ class JoinedCalls:
         self.views = list(dict.fromkeys(view for call in calls for view in call.views))
         self.n_steps = self.n_refused = self.wait = 0
         self.mean_steps = 0.0
+        self.recorded: list[tuple[Any, ...]] = []
+        self.is_known = False
 
     def run(self) -> None:
         """Run the calls."""
@@ -58,7 +62,7 @@ class JoinedCalls:
         self.n_steps += 1
         if kept.__class__ is Joined and self.n_steps > 1:
             self._replay(kept)
-        elif self.n_steps == self.wait:
+        elif self.wait <= self.n_steps <= self.wait + 1:
             self._record()
         else:
             for call in self.calls:
@@ -111,17 +115,19 @@ class JoinedCalls:
                     callers.append((call.views[0], call.views[0]._caller))
         finally:
             context.later = None
-        calls = recorded.calls
+        before, self.recorded = self.recorded, recorded.calls
+        calls, is_first = recorded.calls, self.n_steps == self.wait and not self.is_known
         are_repeatable = all(
             may_be_repeated(calls[a:b], "motion" in call.names)
             for (a, b), call in zip(pairwise([0, *ends]), self.calls, strict=True)
         )
-        if recorded.is_whole and calls and are_repeatable:
-            self.views[0].kept[self] = Joined(Replay(calls), ends, later, callers)
-            self.n_refused = 0
-        else:
+        self.is_known = self.is_known or (not is_first and are_same(before, calls))
+        if not (recorded.is_whole and calls and are_repeatable and (is_first or self.is_known)):
             self.n_refused += 1
             self.wait *= 2
+        elif not is_first:
+            self.views[0].kept[self] = Joined(Replay(calls), ends, later, callers)
+            self.n_refused = 0
 
 
 def joined(state: SimulationState, calls: Sequence[Call]) -> list[Callable[[], None]]:

@@ -96,6 +96,31 @@ def may_be_repeated(calls: Sequence[tuple[Any, ...]], moves: bool) -> bool:
     )
 
 
+def are_same(before: Sequence[tuple[Any, ...]], now: Sequence[tuple[Any, ...]]) -> bool:
+    """Whether two steps make the same calls: kernels, numbers, and the memory of arrays, but for arrays that kernels of the step write."""
+    if [each for each, *_ in before] != [each for each, *_ in now]:
+        return False
+    written: list[tuple[int, int]] = []
+    for (each, *old), (_, *new) in zip(before, now, strict=True):
+        for code, a, b in zip(each.arguments, old, new, strict=True):
+            parts = [(code, a, b)] if isinstance(code, str) else zip(code, a, b, strict=True)
+            for letter, one, other in parts:
+                if not isinstance(other, np.ndarray):
+                    if one != other:
+                        return False
+                elif letter.endswith("w"):
+                    written.append((address_of(other), address_of(other) + other.nbytes))
+                elif address_of(one) != (at := address_of(other)):
+                    if not any(start <= at < end for start, end in written):
+                        return False
+    return True
+
+
+def address_of(array: np.ndarray) -> int:
+    """Address of the first number of an array."""
+    return int(array.__array_interface__["data"][0])
+
+
 class Replay:
     """Makes recorded calls again.
 

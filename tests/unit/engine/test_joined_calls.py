@@ -297,7 +297,7 @@ class Breaks(Spiral):
     """Does what its promise excludes, by name."""
 
     only_calls_kernels = True
-    what = Param("time", choices=("time", "draws", "publishes"))
+    what = Param("time", choices=("time", "draws", "steps", "publishes"))
     capture = Publish(CaptureEntity)
 
     def step(self, g):
@@ -305,6 +305,8 @@ class Breaks(Spiral):
             self.angle[:] = g.t
         elif self.what == "draws":
             self.angle[:] = g.uniform("angle")
+        elif self.what == "steps":
+            g.step(self, self.angle < 0.0)
         else:
             self.capture.publish([0], target=1)
         super().step(g)
@@ -312,7 +314,12 @@ class Breaks(Spiral):
 
 @pytest.mark.parametrize(
     ("what", "text"),
-    [("time", "reads the time"), ("draws", "draws 'angle'"), ("publishes", "publishes before `finish`")],
+    [
+        ("time", "reads the time"),
+        ("draws", "draws 'angle'"),
+        ("steps", "steps Breaks for some rows"),
+        ("publishes", "publishes before `finish`"),
+    ],
 )
 def test_a_plugin_that_does_more_than_it_promises_is_refused(what, text):
     with (
@@ -428,6 +435,38 @@ def test_no_kernel_runs_twice_in_a_step_and_no_list_is_read_where_it_was(mission
         mission, [3, 4], lambda simulation, step: few_spans(simulation) if step == 12 else None, steps=20
     )
     assert joined == apart
+
+
+class Doubles(Spiral):
+    """Gives a kernel an array that NumPy makes in each step, or a number that differs."""
+
+    only_calls_kernels = True
+    what = Param("array", choices=("array", "number"))
+
+    def step(self, g):
+        x, y, _ = g.components("pos")
+        if self.what == "array":
+            spiral(2.0 * x, y, self.angle, self.gain, g.dt, self.angle, *self.velocity)
+        else:
+            spiral(x, y, self.angle, self.gain, float(x[0]), self.angle, *self.velocity)
+
+
+class Nearest(Spiral):
+    """Gives a kernel what a search found, and a view of what a kernel before wrote."""
+
+    only_calls_kernels = True
+
+    def step(self, g):
+        yaw, between = g.column("yaw"), np.empty((2, g.n))
+        placed(yaw, yaw, *between)
+        spiral(g.nearest().distance[0], between[1], self.angle, self.gain, g.dt, self.angle, *self.velocity)
+
+
+@pytest.mark.parametrize("autonomy", [Doubles(), Doubles(what="number"), Nearest()], ids=repr)
+def test_arrays_and_numbers_that_differ_from_step_to_step_are_not_joined(autonomy, replays):
+    joined, apart = pair(swarm(autonomy), [3, 4])
+    assert joined == apart
+    assert not (replays and isinstance(autonomy, Doubles))
 
 
 class Limited(Spiral):
