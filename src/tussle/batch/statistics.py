@@ -317,7 +317,7 @@ def means_of(name: str, rows: Sequence[np.ndarray], *, is_share: bool = False) -
     for n in np.unique(sizes).tolist():
         places = np.flatnonzero(sizes == n).tolist()
         same = np.array([known[i] for i in places])
-        low, high = (_by_t if is_share and n > 1 else mean_intervals)(same)
+        low, high = (_by_t if is_share else mean_intervals)(same)
         nothing = np.full(len(same), np.nan)
         sd = same.std(axis=1, ddof=1) if n > 1 else nothing
         mean = same.mean(axis=1) if n else nothing
@@ -343,10 +343,10 @@ def mean_intervals(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     Args:
         rows: Finite values, (k, n).
     """
-    k, n = rows.shape
-    if n < 2:
-        return np.full(k, np.nan), np.full(k, np.nan)
+    n = rows.shape[1]
     low, high = _by_t(rows)
+    if n < 2:
+        return low, high
     varies = np.ptp(rows, axis=1) > ROUNDING * np.abs(rows).max(axis=1)
     if BOOTSTRAP_FROM <= n <= MAX_BOOTSTRAPPED and varies.any():
         low[varies], high[varies] = _by_bootstrap(rows[varies])
@@ -354,8 +354,10 @@ def mean_intervals(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _by_t(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Student's interval; with many values the normal one."""
-    n = rows.shape[1]
+    """Student's interval, NaN for less than two values; with many values the normal one."""
+    k, n = rows.shape
+    if n < 2:
+        return np.full(k, np.nan), np.full(k, np.nan)
     mean = rows.mean(axis=1)
     half = (
         float(scipy_package().special.stdtrit(n - 1, 0.5 + LEVEL / 2.0))
