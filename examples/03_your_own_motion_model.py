@@ -51,9 +51,9 @@ class Planner(Autonomy):
 
 
 # The last writer of a channel wins, so the planner steers; the predator only claims prey within its range.
-pack = {"position": (1200, 0, 0), "heading": "180 deg", "autonomy": [Predator(), Planner()], "motion": PLANE}
-flock = {"variance": (2e4, 2e4, 0), "autonomy": Boids(), "motion": Unicycle(vel_max=30)}
-blocks = [Block(name="prey", team=1, count=60, **flock), Block(name="hunters", team=2, count=5, **pack)]
-game = {"interactions": [SimpleCapture()], "metrics": [SimpleCaptureMetrics()]}
-for r in Simulation(Mission(blocks=blocks, end=60, **game), seeds=range(1, 5)).run():
+pack = [Predator(), Planner()]
+hunters = Block(name="hunters", team=2, count=5, position=(1200, 0, 0), heading="180 deg", autonomy=pack, motion=PLANE)  # fmt: skip
+prey = Block(name="prey", team=1, count=60, variance=(2e4, 2e4, 0), autonomy=Boids(), motion=Unicycle(vel_max=30))  # fmt: skip
+game = Mission(blocks=[prey, hunters], end=60, interactions=[SimpleCapture()], metrics=[SimpleCaptureMetrics()])  # fmt: skip
+for r in Simulation(game, seeds=range(1, 5)).run():
     print(f"game {r.seed}: {r.scores[2]:g} captures, {r.alive[1]} prey left after {r.t:g} s")
