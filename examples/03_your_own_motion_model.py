@@ -51,10 +51,9 @@ class Planner(Autonomy):
 
 
 # The last writer of a channel wins, so the planner steers; the predator only claims prey within its range.
-pack, place = [Predator(), Planner()], (1200, 0, 0)
-rules, scores = [SimpleCapture()], [SimpleCaptureMetrics()]
+pack, place, rules = [Predator(), Planner()], (1200, 0, 0), [SimpleCapture()]
 prey = Block(name="prey", team=1, count=60, variance=(2e4, 2e4, 0), autonomy=Boids(), motion=PREY)
 hunters = Block(name="hunters", team=2, count=5, position=place, heading=np.pi, autonomy=pack, motion=PLANE)
-game = Mission(blocks=[prey, hunters], end=60, interactions=rules, metrics=scores)
+game = Mission(blocks=[prey, hunters], end=60, interactions=rules, metrics=[SimpleCaptureMetrics()])
 for r in Simulation(game, seeds=range(1, 5)).run():
     print(f"game {r.seed}: {r.scores[2]:g} captures, {r.alive[1]} prey left after {r.t:g} s")
