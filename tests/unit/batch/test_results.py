@@ -342,6 +342,17 @@ def test_seeds_that_give_one_final_state_are_copies_and_not_observations():
     assert distinct.shares()[0].low == wilson(30, 30)[0]
 
 
+def test_runs_with_one_final_state_and_other_results_are_no_copies():
+    """A radio loses other messages in each game, which changes nothing else."""
+    lost = np.array([6.0, 10.0, np.nan, 6.0, 10.0, np.nan, 7.0, -0.0]).reshape(8, 1)
+    same = dict.fromkeys(range(8), "a" * 16)
+    zeros = np.zeros((8, 1))
+    results = Results(made_batch({2: zeros, 3: zeros}, metrics={"Radio.lost": {None: lost}}, hashes=same))
+    assert results.n_distinct == 5
+    mean = results.means(["Radio.lost"])[0]
+    assert (mean.n, mean.low < mean.value < mean.high) == (6, True)
+
+
 def test_intervals_of_points_and_comparisons_count_distinct_games():
     variable = Choice("tactic", ("keep", "switch"))
     luck = np.random.default_rng(1).normal(size=(5, 1))
