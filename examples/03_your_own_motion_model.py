@@ -29,7 +29,7 @@ class SluggishPlane(MotionModel):
         body.vel[:] = self.x[5] * body.forward
 
 
-PLANE = SluggishPlane(lag=1.0)
+PLANE, PREY = SluggishPlane(lag=1.0), Unicycle(vel_max=30)
 STEERING = np.meshgrid(38.0, np.linspace(-1.5, 1.5, 7), np.linspace(-1.0, 1.0, 5))
 PLANS = np.array(STEERING).reshape(3, 35)  # (3 commands, 35 plans)
 SECONDS = 0.3 * np.arange(11)[:, None, None]
@@ -51,9 +51,9 @@ class Planner(Autonomy):
 
 
 # The last writer of a channel wins, so the planner steers; the predator only claims prey within its range.
-pack = {"position": (1200, 0, 0), "heading": "180 deg", "autonomy": [Predator(), Planner()], "motion": PLANE}
-flock = {"variance": (2e4, 2e4, 0), "autonomy": Boids(), "motion": Unicycle(vel_max=30)}
-blocks = [Block(name="prey", team=1, count=60, **flock), Block(name="hunters", team=2, count=5, **pack)]
-game = {"interactions": [SimpleCapture()], "metrics": [SimpleCaptureMetrics()]}
-for r in Simulation(Mission(blocks=blocks, end=60, **game), seeds=range(1, 5)).run():
+pack, place, rules = [Predator(), Planner()], (1200, 0, 0), [SimpleCapture()]
+prey = Block(name="prey", team=1, count=60, variance=(2e4, 2e4, 0), autonomy=Boids(), motion=PREY)
+hunters = Block(name="hunters", team=2, count=5, position=place, heading=np.pi, autonomy=pack, motion=PLANE)
+game = Mission(blocks=[prey, hunters], end=60, interactions=rules, metrics=[SimpleCaptureMetrics()])
+for r in Simulation(game, seeds=range(1, 5)).run():
     print(f"game {r.seed}: {r.scores[2]:g} captures, {r.alive[1]} prey left after {r.t:g} s")

@@ -349,3 +349,19 @@ def test_empty_scene_stops_no_ray() -> None:
 def test_unknown_boundary_names_the_nearest() -> None:
     with pytest.raises(ParameterError, match=r"no boundary 'feild' \(did you mean 'field'\?\)"):
         Scene(boundaries={1: Sphere(), "field": Sphere()}).boundary("feild")
+
+
+@pytest.mark.parametrize(
+    "pos", [[1.0, -2.0, 300.0], [[1.0, 4.0], [-2.0, 5.0], [300.0, 6.0]]], ids=["one", "two"]
+)
+def test_earth_centred_positions_have_the_shape_of_what_is_given(pos):
+    origin = Origin.from_degrees(-33.9, 151.2, 40.0)
+    latitude, longitude, altitude = origin.to_geodetic(pos)
+    curvature = 6378137.0 / np.sqrt(1.0 - 6.69437999014e-3 * np.sin(latitude) ** 2)
+    out = (curvature + altitude) * np.cos(latitude)
+    up = (curvature * (1.0 - 6.69437999014e-3) + altitude) * np.sin(latitude)
+    expected = np.array([out * np.cos(longitude), out * np.sin(longitude), up])
+    found = origin.to_earth_centred(pos)
+    assert found.shape == np.shape(pos)
+    np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-6)
+    np.testing.assert_allclose(origin.from_earth_centred(found.tolist()), pos, rtol=0.0, atol=1e-6)

@@ -224,6 +224,8 @@ class GroupView:
 
         With `active`, (n,), only for the rows where it is true: the columns of the others keep their values.
         """
+        if active is not None:
+            self._differs(f"steps {type(plugin).__name__} for some rows")
         caller, self._caller = self._caller, plugin
         if active is None or active.all():
             plugin.step(self)

@@ -13,7 +13,7 @@ from tussle.api.row_laws import step_rows
 from tussle.api.world import WorldView
 from tussle.declare.columns import EntityRef, Output, Param
 from tussle.declare.messages import Messages
-from tussle.errors import DeclarationError
+from tussle.errors import DeclarationError, ParameterError
 from tussle.world.scene import HeightField, TeamRegion, Volume
 
 
@@ -126,10 +126,25 @@ class WorldPlugin(Plugin):
         return {}
 
     def result_of(self, w: WorldView, world: int) -> dict[str, Any]:
-        """Results of one world: name -> number, or name -> {team: number}."""
+        """Results of one world: name -> number, or name -> {team: number}.
+
+        Raises:
+            ParameterError: A result has another shape.
+        """
         out: dict[str, Any] = {}
-        for name, array in self.result(w).items():
-            item = np.asarray(array)[..., world]
+        by_world, by_team = (w.n_worlds,), (len(w.teams), w.n_worlds)
+        for name, value in self.result(w).items():
+            array = np.asarray(value)
+            allowed = [by_team] if name == "score" and isinstance(self, Metric) else [by_world, by_team]
+            if array.shape not in allowed:
+                raise ParameterError(
+                    f"{type(self).__name__}.result: {name!r} has the shape {array.shape}; it takes "
+                    + " or ".join(
+                        f"{shape}, one per {'world' if shape == by_world else 'team and world'}"
+                        for shape in allowed
+                    )
+                )
+            item = array[..., world]
             out[name] = dict(zip(w.teams.tolist(), item.tolist(), strict=True)) if item.ndim else item.item()
         return out
 

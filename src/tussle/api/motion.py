@@ -88,7 +88,7 @@ class MotionModel(EntityPlugin):
     """
 
     kind = "motion"
-    derivative: ClassVar[Any] = None
+    derivative: Any = None
     abstract: ClassVar[bool] = True
     reads_all: ClassVar[bool] = False
     """All channels of the entity are computed, since they are read from outside."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -21,6 +22,8 @@ quantities. What plugins report may differ between points."""
 MAX_METRICS = 10_000
 MAX_VALUE = 1e100
 """Largest metric that counts as finite: sums of squares of larger ones, as variances take them, are not."""
+MAX_NAME = 150
+"""Characters of the name of a metric that a batch keeps; expressions with it may have a few more, see `quantities.MAX_TEXT`."""
 ALWAYS_ALLOWED = 1_000_000
 """Largest number of cells of a batch."""
 
@@ -75,6 +78,13 @@ def check_results(table: pa.Table, design: pa.Table, file: Path) -> None:
     for name in ("point", "seed"):
         if name in table.column_names and (table[name].to_numpy() != design[name].to_numpy()[run]).any():
             raise BatchError(f"{file}: a run has another {name} than in the design")
+
+
+def bounded(value: float) -> float:
+    """A metric, also a whole number of any size, as a batch keeps it: infinite beyond `MAX_VALUE`."""
+    if abs(value) > MAX_VALUE:
+        return math.inf if value > 0 else -math.inf
+    return float(value)
 
 
 def check_metrics(results: pa.Table, file: Path) -> None:

@@ -68,7 +68,7 @@ class Results:
         table: One row per run, team and metric.
         alive: Entities of each run and team whenever their number changes.
         runs: One row per finished run: keys, variables, how it ended, and each quantity.
-        n_distinct: Distinct games among the runs that did not fail: runs of one point with one final state are copies.
+        n_distinct: Distinct games among the runs that did not fail: runs of one point with one final state and the same results are copies.
     """
 
     def __init__(self, stored: StoredBatch) -> None:
@@ -83,7 +83,8 @@ class Results:
         self._point: np.ndarray = facts["point"].to_numpy()
         self._seed_index: np.ndarray = self._run // max(1, len(self.points))
         self._is_failed = run_table.is_failed(facts)
-        self._game = run_table.distinct_games(facts, self._is_failed)
+        self._columns = self._quantities_of(facts)
+        self._game = run_table.distinct_games(facts, self._is_failed, self._columns.values())
         self.n_distinct: int = len(np.unique(self._game[~self._is_failed]))
         if n_copies := self.n_runs - self.n_failed - self.n_distinct:
             self.notes.append(
@@ -91,7 +92,6 @@ class Results:
                 f"intervals count distinct games ({self.n_distinct:,})"
             )
         self._fits: dict[tuple[str, bool], Response] = {}
-        self._columns = self._quantities_of(facts)
         names = [v.name for v in self.variables]
         keyed = run_table.with_values(facts, self.design, names, self._columns)
         new = {n: pa.array(v) for n, v in self._columns.items() if n not in run_table.FACTS}

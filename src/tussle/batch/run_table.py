@@ -77,16 +77,26 @@ def with_values(
     return columns | {name: runs[name] for name in FACTS}
 
 
-def distinct_games(runs: pa.Table, failed: np.ndarray) -> np.ndarray:
-    """A number for each run, (n_runs,): the same for runs of one point that ended in the same state, which are copies of one game.
+def distinct_games(runs: pa.Table, failed: np.ndarray, quantities: Collection[np.ndarray] = ()) -> np.ndarray:
+    """A number for each run, (n_runs,): the same for runs of one point that ended in the same state and have the same results.
+
+    These are copies of one game. Where the state is the same, the results may differ: a radio loses other messages, which nobody needs.
 
     Args:
         runs: One row per run.
         failed: Which runs failed, (n_runs,): none of them is a copy.
+        quantities: Each result of the runs, (n_runs,).
     """
     text = pc.fill_null(runs["state_hash"].combine_chunks(), "").dictionary_encode()
     hashes = text.indices.to_numpy().astype(np.int64)
     is_known = ~failed & (np.array([*text.dictionary.to_pylist(), ""], dtype=object)[hashes] != "")
     own = np.where(is_known, 0, 1 + np.arange(len(failed)))  # apart from all others
     keys = np.stack([runs["point"].to_numpy().astype(np.int64), hashes, own], axis=1)
-    return np.asarray(np.unique(keys, axis=0, return_inverse=True)[1]).ravel()
+    game, size = np.unique(keys, axis=0, return_inverse=True, return_counts=True)[1:]
+    game = np.asarray(game).ravel()
+    alike = np.flatnonzero(size[game] > 1)
+    if len(alike) and quantities:
+        bits = [np.asarray(values, np.float64)[alike].view(np.int64) for values in quantities]
+        known = np.unique(np.stack([game[alike], *bits], axis=1), axis=0, return_inverse=True)[1]
+        game[alike] = game.max() + 1 + np.asarray(known).ravel()
+    return np.asarray(np.unique(game, return_inverse=True)[1]).ravel()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from tussle.batch.variables import Choice, Range, Variable
@@ -24,13 +24,12 @@ def select_points(variables: Sequence[Variable], points: Points, text: str) -> l
     if is_number(text):
         return [known_point(points, int(text))]
     wanted = _values(variables, text)
-    found = [
-        i for i, point in enumerate(points) if all(_agree(point[v.name], shown, v) for v, shown in wanted)
-    ]
+    named = [(v.name, _named(dict.fromkeys(point[v.name] for point in points), shown)) for v, shown in wanted]
+    found = [i for i, point in enumerate(points) if all(point[name] in values for name, values in named)]
     if found:
         return found
-    for variable, shown in wanted:
-        if not any(_agree(point[variable.name], shown, variable) for point in points):
+    for (variable, shown), (_, values) in zip(wanted, named, strict=True):
+        if not values:
             there = list(dict.fromkeys(written(point[variable.name]) for point in points))
             more = f" and {len(there) - MAX_LISTED} more" if len(there) > MAX_LISTED else ""
             raise ParameterError(
@@ -126,15 +125,17 @@ def _values(variables: Sequence[Variable], text: str) -> list[tuple[Variable, st
     return found
 
 
-def _agree(value: Any, shown: str, variable: Variable) -> bool:
-    """Return True if a text names a value; numbers are compared to six digits."""
-    if isinstance(value, (int, float)) and not isinstance(value, bool):
-        try:
-            number = float(shown)
-        except ValueError:
-            return False
-        return math.isclose(value, number, rel_tol=5e-6)
-    return str(value) == shown
+def _named(values: Iterable[Any], shown: str) -> list[Any]:
+    """The values that a text names: the one whose text it is, else the number that it is, else those that agree to six digits."""
+    values = list(values)
+    numbers = [v for v in values if isinstance(v, (int, float)) and not isinstance(v, bool)]
+    try:
+        number = float(shown)
+    except ValueError:
+        number = math.nan
+    tolerances = (0.0, 5e-6)
+    alike = ([v for v in numbers if math.isclose(v, number, rel_tol=tolerance)] for tolerance in tolerances)
+    return next(filter(None, ([v for v in values if str(v) == shown], *alike)), [])
 
 
 def original(value: Any, variable: Variable) -> Any:

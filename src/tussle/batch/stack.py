@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 
 from tussle.api import Plugin
+from tussle.batch.consistency import MAX_NAME, bounded
+from tussle.batch.quantities import column_name
 from tussle.batch.tasks import BatchRun, Finished, Heartbeat, Watcher
 from tussle.declare.columns import Handle
 from tussle.engine.result import WorldResult
@@ -258,18 +260,19 @@ def metrics_of(result: WorldResult) -> list[tuple[int | None, str, float]]:
     """All metrics of a run, of teams and of the world."""
     out: list[tuple[int | None, str, float]] = []
     for name, counts in (("score", result.scores), ("alive", result.alive), ("start", result.born)):
-        out += [(team, name, float(value)) for team, value in counts.items()]
+        out += [(team, name, bounded(value)) for team, value in counts.items()]
     for plugin, named in result.metrics.items():
         for name, found in named.items():
             by_team = found if isinstance(found, dict) else {None: found}
-            if all(isinstance(value, (bool, int, float)) for value in by_team.values()):
-                out += [(team, f"{plugin}.{name}", float(value)) for team, value in by_team.items()]
+            metric, why = f"{plugin}.{name}", ""
+            if not all(isinstance(value, (bool, int, float)) for value in by_team.values()):
+                why = f"reports {name!r} as {found!r}, which is no number, so the batch does not keep it"
+            elif (length := len(column_name(metric, None))) > MAX_NAME:
+                why = f"reports {name[:40]!r}..., whose name has {length} characters, so the batch does not keep it; at most {MAX_NAME}"
             else:
-                warnings.warn(
-                    f"{plugin} reports {name!r} as {found!r}, which is no number, so the batch does not keep it",
-                    RuntimeWarning,
-                    stacklevel=2,
-                )
+                out += [(team, metric, bounded(value)) for team, value in by_team.items()]
+            if why:
+                warnings.warn(f"{plugin} {why}", RuntimeWarning, stacklevel=2)
     return out or [
         (None, "alive", 0.0)
     ]  # the tables have one row per metric, so a run without any would be missing

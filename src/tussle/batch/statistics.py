@@ -89,8 +89,8 @@ class PairedComparison:
         a: The reference.
         b: What is compared.
         n: Pairs.
-        mean_a: Mean of a's runs.
-        mean_b: Mean of b's runs.
+        mean_a: Mean of a's runs; over several points, of the points' means.
+        mean_b: Mean of b's runs, likewise.
         difference: mean_b - mean_a.
         low: Lower end of the interval of the difference.
         high: Its upper end.
@@ -317,7 +317,7 @@ def means_of(name: str, rows: Sequence[np.ndarray], *, is_share: bool = False) -
     for n in np.unique(sizes).tolist():
         places = np.flatnonzero(sizes == n).tolist()
         same = np.array([known[i] for i in places])
-        low, high = (_by_t if is_share and n > 1 else mean_intervals)(same)
+        low, high = (_by_t if is_share else mean_intervals)(same)
         nothing = np.full(len(same), np.nan)
         sd = same.std(axis=1, ddof=1) if n > 1 else nothing
         mean = same.mean(axis=1) if n else nothing
@@ -343,10 +343,10 @@ def mean_intervals(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     Args:
         rows: Finite values, (k, n).
     """
-    k, n = rows.shape
-    if n < 2:
-        return np.full(k, np.nan), np.full(k, np.nan)
+    n = rows.shape[1]
     low, high = _by_t(rows)
+    if n < 2:
+        return low, high
     varies = np.ptp(rows, axis=1) > ROUNDING * np.abs(rows).max(axis=1)
     if BOOTSTRAP_FROM <= n <= MAX_BOOTSTRAPPED and varies.any():
         low[varies], high[varies] = _by_bootstrap(rows[varies])
@@ -354,8 +354,10 @@ def mean_intervals(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _by_t(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Student's interval; with many values the normal one."""
-    n = rows.shape[1]
+    """Student's interval, NaN for less than two values; with many values the normal one."""
+    k, n = rows.shape
+    if n < 2:
+        return np.full(k, np.nan), np.full(k, np.nan)
     mean = rows.mean(axis=1)
     half = (
         float(scipy_package().special.stdtrit(n - 1, 0.5 + LEVEL / 2.0))
@@ -447,7 +449,10 @@ def paired_difference(
     n_greater, n_less = int((more > 0.0).sum()), int((more < 0.0).sum())
     mean = mean_of(quantity, more, own, strata, are_copies=are_copies)
     signs = np.sign(more if own is None or not are_copies else more[np.unique(own, return_index=True)[1]])
-    mean_a, mean_b = (float(v.mean()) if len(v) else math.nan for v in (a, b))
+    mean_a, mean_b = (
+        math.nan if not len(v) else float(v.mean()) if strata is None else _over_strata(v, strata)[0]
+        for v in (a, b)
+    )
     return PairedComparison(
         quantity, *names, len(more), mean_a, mean_b, mean.value, mean.low, mean.high,
         n_greater, n_less, len(more) - n_greater - n_less,

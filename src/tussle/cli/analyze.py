@@ -146,8 +146,9 @@ def _shares(shares: Sequence[Share]) -> Iterable[RenderableType]:
 
 
 def _means(found: Analysis) -> Iterable[RenderableType]:
-    """Return means with their intervals; with points their extremes, else the quantiles of the runs."""
+    """Return means with their intervals; with points their extremes, else the quantiles of the runs; games, where some have no value."""
     rows: list[Row] = []
+    lacks = any(mean.n < found.n_runs - found.n_failed for mean in found.means)
     for mean in found.means:
         digits = _digits(mean.high - mean.low, mean.value)
         metric, _, team = found.titles[mean.name].partition(" of ")
@@ -168,9 +169,9 @@ def _means(found: Analysis) -> Iterable[RenderableType]:
             cells.append(_number(mean.sd, digits))
             values = (mean.quantiles[q] for q in (0.05, 0.5, 0.95))
             cells += [f"{value:.4g}" if math.isfinite(value) else "" for value in values]
-        rows.append(("", cells))
+        rows.append(("", [*cells, f"{mean.n:,}"] if lacks else cells))
     more = ["lowest point", "highest point"] if found.points else ["q 5 %", "median", "q 95 %"]
-    return number_tables(["", "mean", "95 % interval", "sd", *more], rows)
+    return number_tables(["", "mean", "95 % interval", "sd", *more, *(["games"] if lacks else [])], rows)
 
 
 # -- points -----------------------------------------------------------------------------------------------------------------

@@ -287,6 +287,8 @@ class Param(Numbers):
             return bool(value)
         if self.dtype is bool or isinstance(value, (bool, np.bool_)):
             raise self._error(where, value, self.allowed())
+        if isinstance(value, int) and abs(value) > MAX_NUMBER:  # which may be more than a float holds
+            raise self._error(where, value, f"{self.allowed()} and of at most {MAX_NUMBER:g}")
         if not isinstance(value, (int, float, np.integer, np.floating)) or math.isnan(value):
             raise self._error(where, value, self.allowed())
         is_inexact = isinstance(value, float) and not abs(value) <= MAX_INTEGER

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from bisect import bisect
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
 
 from tussle.api.group import GroupView
 from tussle.engine import failure
 from tussle.engine.calls import Call
 from tussle.engine.state import SimulationState
-from tussle.numeric.replay import Replay, recording
+from tussle.errors import PluginError
+from tussle.numeric.replay import Replay, are_same, may_be_repeated, recording
 
 WORTH = 20.0
 """Number of steps for which rows stay the same on average, from which on it is worth packing arguments early."""
@@ -25,18 +29,21 @@ class Joined:
         replay: All kernels.
         ends: Number of kernels up to the end of each call.
         later: For each call, what Python does after its kernels: view, plugin and function.
+        callers: For each call, its view and plugin.
     """
 
     replay: Replay
     ends: list[int]
     later: list[list[tuple[GroupView, object, Callable[[], None]]]]
+    callers: list[tuple[GroupView, object]]
 
 
 class JoinedCalls:
     """Consecutive calls of a schedule that end with a motion model.
 
-    While rows stay the same, each step calls the same kernels with the same arguments. They are recorded in one step, in which
-    all that is kept for the current positions is computed again, and called by `Replay` from then on.
+    While rows stay the same, each step calls the same kernels with the same arguments. They are recorded in two steps, in which
+    all that is kept for the current positions is computed again, and called by `Replay` from then on. Where the second step's
+    arguments are others, the calls are not joined. Once they have been the same, one step is recorded whenever rows have changed.
     """
 
     def __init__(self, state: SimulationState, calls: Sequence[Call]) -> None:
@@ -44,6 +51,8 @@ class JoinedCalls:
         self.views = list(dict.fromkeys(view for call in calls for view in call.views))
         self.n_steps = self.n_refused = self.wait = 0
         self.mean_steps = 0.0
+        self.recorded: list[tuple[Any, ...]] = []
+        self.is_known = False
 
     def run(self) -> None:
         """Run the calls."""
@@ -53,7 +62,7 @@ class JoinedCalls:
         self.n_steps += 1
         if kept.__class__ is Joined and self.n_steps > 1:
             self._replay(kept)
-        elif self.n_steps == self.wait:
+        elif self.wait <= self.n_steps <= self.wait + 1:
             self._record()
         else:
             for call in self.calls:
@@ -70,7 +79,11 @@ class JoinedCalls:
             view.kept[self] = True
 
     def _replay(self, joined: Joined) -> None:
-        done = joined.replay.run()
+        try:
+            done = joined.replay.run()
+        except Exception as error:
+            view, plugin = joined.callers[bisect(joined.ends, int(joined.replay.at[0]))]
+            raise self._failed(error, plugin, view) from error
         bodies = self.state.population.bodies
         bodies.touch(0, bodies.n)
         for end, later, call in zip(joined.ends, joined.later, self.calls, strict=True):
@@ -82,13 +95,16 @@ class JoinedCalls:
                 try:
                     function()
                 except Exception as error:
-                    group = next(g for g in self.state.population.groups if view in g.views)
-                    raise failure.in_call(error, plugin, view, group) from error
+                    raise self._failed(error, plugin, view) from error
+
+    def _failed(self, error: Exception, plugin: object, view: GroupView) -> PluginError:
+        group = next(g for g in self.state.population.groups if view in g.views)
+        return failure.in_call(error, plugin, view, group)
 
     def _record(self) -> None:
         bodies, context = self.state.population.bodies, self.state.context
         bodies.touch(0, bodies.n)
-        ends, later = [], []
+        ends, later, callers = [], [], []
         try:
             with recording() as recorded:
                 for call in self.calls:
@@ -96,14 +112,22 @@ class JoinedCalls:
                     call.run()
                     ends.append(len(recorded.calls))
                     later.append(context.later)
+                    callers.append((call.views[0], call.views[0]._caller))
         finally:
             context.later = None
-        if recorded.is_whole and ends[-1]:
-            self.views[0].kept[self] = Joined(Replay(recorded.calls), ends, later)
-            self.n_refused = 0
-        else:
+        before, self.recorded = self.recorded, recorded.calls
+        calls, is_first = recorded.calls, self.n_steps == self.wait and not self.is_known
+        are_repeatable = all(
+            may_be_repeated(calls[a:b], "motion" in call.names)
+            for (a, b), call in zip(pairwise([0, *ends]), self.calls, strict=True)
+        )
+        self.is_known = self.is_known or (not is_first and are_same(before, calls))
+        if not (recorded.is_whole and calls and are_repeatable and (is_first or self.is_known)):
             self.n_refused += 1
             self.wait *= 2
+        elif not is_first:
+            self.views[0].kept[self] = Joined(Replay(calls), ends, later, callers)
+            self.n_refused = 0
 
 
 def joined(state: SimulationState, calls: Sequence[Call]) -> list[Callable[[], None]]:

@@ -42,12 +42,11 @@ class WorldResult:
 
     @property
     def winner(self) -> int | None:
-        """Team with the highest score; None on a tie or without scores."""
-        if not self.scores:
-            return None
-        best = max(self.scores.values())
-        leaders = [team for team, score in self.scores.items() if score == best]
-        return leaders[0] if len(leaders) == 1 else None
+        """Team with a higher score than every other; None on a tie, without scores, and where another's is not a number."""
+        for team, score in self.scores.items():
+            if all(score > other for rival, other in self.scores.items() if rival != team):
+                return team
+        return None
 
     def __repr__(self) -> str:
         return line("WorldResult", "", *self._facts())

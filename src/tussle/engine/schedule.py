@@ -234,10 +234,13 @@ def _entity_call(state: SimulationState, kind: str, group: Group, binding: Bindi
 
 
 def _only_calls_kernels(state: SimulationState, binding: Binding) -> bool:
-    """Whether all that a plugin does in a step is to call kernels, in one thread, with the same arguments while rows stay the same."""
+    """Whether all that a plugin does in a step is to call kernels, in one thread, with the same arguments while rows stay the same.
+
+    Lists are in other arrays whenever they are written.
+    """
     is_alone = state.context.threads == 1 and not state.population.is_sequential
     return is_alone and all(
-        vars(type(b.plugin)).get("only_calls_kernels") and not b.handles for b in binding.walk()
+        vars(type(b.plugin)).get("only_calls_kernels") and not (b.handles or b.ragged) for b in binding.walk()
     )
 
 

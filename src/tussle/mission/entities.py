@@ -336,7 +336,7 @@ class EntityReader:
             self.bases.append(
                 Base(
                     team=team,
-                    position=fields.position(self.origin),  # type: ignore[arg-type]
+                    position=fields.position(self.origin),
                     radius=fields.number("radius"),
                     opacity=fields.number("opacity"),
                 )

@@ -225,7 +225,7 @@ def _building(_: Node, given: dict[str, str]) -> Prism:
     low, high = (
         codecs.number(given.get(name, default), "m") for name, default in (("low", "0"), ("high", "10"))
     )
-    return Prism(tuple(corners), low, high)  # type: ignore[arg-type]
+    return Prism(tuple(corners), low, high)
 
 
 def _numbers(text: str, n: int, name: str, unit: str) -> tuple[float, ...]:

@@ -12,6 +12,7 @@ import numpy as np
 
 from tussle.numeric.address import caller
 from tussle.numeric.bound import RESULTS, Bound
+from tussle.numeric.fingerprint import package
 from tussle.numeric.kernel import Kernel, kernel, ready, stats
 
 _is_recording = threading.Lock()
@@ -68,20 +69,56 @@ def recording() -> Iterator[KernelCalls]:
 
 @cache
 def kernel_of_replays() -> Kernel:
-    """The kernel (entries, addresses, truths, words -> number) that calls bound kernels until one does not return True.
+    """The kernel (entries, addresses, truths, words, at -> number) that calls bound kernels until one does not return True.
 
     entries, addresses: of the bound kernels and of their words. truths: place of what each returns in `words`, -1 if it is nothing.
+    at: number of the kernel that is called, (1,), for errors.
     """
     call_bound = caller("i8")
 
-    def run(entries, addresses, truths, words):  # type: ignore[no-untyped-def]
+    def run(entries, addresses, truths, words, at):  # type: ignore[no-untyped-def]
         for k in range(entries.shape[0]):
+            at[0] = k
             call_bound(entries[k], addresses[k])
             if truths[k] >= 0 and words[truths[k]] == 0:
                 return k
         return entries.shape[0]
 
-    return kernel("I I I I -> i8")(run)
+    return kernel("I I I I Iw -> i8")(run)
+
+
+def may_be_repeated(calls: Sequence[tuple[Any, ...]], moves: bool) -> bool:
+    """Whether Python may make calls again up to any that returns False: no kernel of a user up to there writes, and nothing `moves`."""
+    stops = [k for k, (each, *_) in enumerate(calls, 1) if each.results]
+    first = calls[: max(stops, default=0)]
+    return not (moves and stops) and all(
+        package(each.py_func) == "tussle" or "w" not in each.signature for each, *_ in first
+    )
+
+
+def are_same(before: Sequence[tuple[Any, ...]], now: Sequence[tuple[Any, ...]]) -> bool:
+    """Whether two steps make the same calls: kernels, numbers, and the memory of arrays, but for arrays that kernels of the step write."""
+    if [each for each, *_ in before] != [each for each, *_ in now]:
+        return False
+    written: list[tuple[int, int]] = []
+    for (each, *old), (_, *new) in zip(before, now, strict=True):
+        for code, a, b in zip(each.arguments, old, new, strict=True):
+            parts = [(code, a, b)] if isinstance(code, str) else zip(code, a, b, strict=True)
+            for letter, one, other in parts:
+                if not isinstance(other, np.ndarray):
+                    if one != other:
+                        return False
+                elif letter.endswith("w"):
+                    written.append((address_of(other), address_of(other) + other.nbytes))
+                elif address_of(one) != (at := address_of(other)):
+                    if not any(start <= at < end for start, end in written):
+                        return False
+    return True
+
+
+def address_of(array: np.ndarray) -> int:
+    """Address of the first number of an array."""
+    return int(array.__array_interface__["data"][0])
 
 
 class Replay:
@@ -89,6 +126,9 @@ class Replay:
 
     Args:
         calls: Kernels with their arguments; the memory of arrays is read at each call.
+
+    Attributes:
+        at: Number of the last kernel that was called, (1,).
     """
 
     def __init__(self, calls: Sequence[tuple[Any, ...]]) -> None:
@@ -98,9 +138,10 @@ class Replay:
         entries = np.array([each.entry for each in self._bound])
         returns = np.array([bool(call[0].results) for call in calls])
         truths = np.where(returns, starts + RESULTS, -1)
-        self._call = entries, words.ctypes.data + 8 * starts, truths, words
+        self.at = np.zeros(1, np.int64)
+        self._call = entries, words.ctypes.data + 8 * starts, truths, words, self.at
         self._run = kernel_of_replays()
 
     def run(self) -> int:
-        """Make the calls. Returns the number of those before the first that did not return True, or of all."""
+        """Make the calls. Returns the number of those before the first that did not return True, or of all. Kernels may raise errors."""
         return int(self._run(*self._call))

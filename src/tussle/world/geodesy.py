@@ -12,6 +12,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from tussle.errors import ParameterError
 from tussle.numeric import atan2, cos, sin, total
@@ -81,7 +82,7 @@ class Origin:
         """Make an origin from latitude and longitude in degrees and altitude in metres."""
         return cls(math.radians(latitude), math.radians(longitude), altitude)
 
-    def from_geodetic(self, geodetic: np.ndarray) -> np.ndarray:
+    def from_geodetic(self, geodetic: ArrayLike) -> np.ndarray:
         """Convert geodetic coordinates to world positions.
 
         Args:
@@ -99,7 +100,7 @@ class Origin:
             [cos_lon * y - sin_lon * x, cos_lat * z - sin_lat * outward, sin_lat * z + cos_lat * outward]
         )
 
-    def to_geodetic(self, pos: np.ndarray) -> np.ndarray:
+    def to_geodetic(self, pos: ArrayLike) -> np.ndarray:
         """Convert world positions to geodetic coordinates; the inverse of `from_geodetic` down to 1000 km below the ground.
 
         B. R. Bowring, The accuracy of geodetic latitude and height equations, Survey Review 28 (1985), 202-206.
@@ -150,13 +151,19 @@ class Origin:
         """
         return np.asarray(quat_multiply(quat_multiply(self.quat, quat), FORWARD_RIGHT_DOWN))
 
-    def to_earth_centred(self, pos: np.ndarray) -> np.ndarray:
-        """Convert world positions [m], (3, n), to positions in Earth-centred axes [m], (3, n)."""
-        return np.asarray(quat_rotate(self.quat, pos) + np.array(self.earth_centred)[:, None])
+    def to_earth_centred(self, pos: ArrayLike) -> np.ndarray:
+        """Convert world positions [m], (3, n) or (3,), to positions in Earth-centred axes [m], same shape."""
+        pos = np.asarray(pos, np.float64)
+        return np.asarray(quat_rotate(self.quat, pos) + self._centre(pos))
 
-    def from_earth_centred(self, pos: np.ndarray) -> np.ndarray:
-        """Convert positions in Earth-centred axes [m], (3, n), to world positions [m], (3, n)."""
-        return np.asarray(quat_rotate_inverse(self.quat, pos - np.array(self.earth_centred)[:, None]))
+    def from_earth_centred(self, pos: ArrayLike) -> np.ndarray:
+        """Convert positions in Earth-centred axes [m], (3, n) or (3,), to world positions [m], same shape."""
+        pos = np.asarray(pos, np.float64)
+        return np.asarray(quat_rotate_inverse(self.quat, pos - self._centre(pos)))
+
+    def _centre(self, pos: np.ndarray) -> np.ndarray:
+        """The place of the origin in Earth-centred axes [m], (3, 1), or (3,) for a single position."""
+        return np.reshape(self.earth_centred, (3, *[1] * (pos.ndim - 1)))
 
     @cached_property
     def _frame(self) -> tuple[tuple[float, float, float, float], tuple[float, float, float]]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -30,7 +31,7 @@ class Prism(Volume):
         ParameterError: A value is not finite, the count of corners is out of bounds, or low is not below high.
     """
 
-    corners: tuple[tuple[float, float], ...]
+    corners: Sequence[Sequence[float]]
     low: float = 0.0
     high: float = 100.0
 
@@ -122,7 +123,7 @@ class Prism(Volume):
         return np.array(found)
 
 
-Corner = tuple[float, float]
+Corner = Sequence[float]
 
 
 def _turn(a: Corner, b: Corner, c: Corner) -> float:
@@ -130,7 +131,7 @@ def _turn(a: Corner, b: Corner, c: Corner) -> float:
     return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 
 
-def _ears(corners: tuple[Corner, ...]) -> list[tuple[Corner, Corner, Corner]]:
+def _ears(corners: Sequence[Corner]) -> list[tuple[Corner, Corner, Corner]]:
     """Divide a simple polygon into triangles by cutting off corners in which no other corner lies.
 
     G. H. Meisters, Polygons have ears, The American Mathematical Monthly 82 (1975).

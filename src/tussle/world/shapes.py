@@ -10,7 +10,7 @@ from __future__ import annotations
 import itertools
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -20,7 +20,7 @@ import numpy as np
 from tussle.errors import ParameterError
 from tussle.numeric import cos, sin, volumes
 
-Vector = tuple[float, float, float]
+Vector = Sequence[float]
 Matrix = tuple[Vector, Vector, Vector]
 IDENTITY: Matrix = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 MAX_POINTS = 32
@@ -242,7 +242,7 @@ class Polyhedron(Convex):
         ParameterError: A value is not finite, there are too few or too many points, or all lie in one plane.
     """
 
-    points: tuple[Vector, ...]
+    points: Sequence[Vector]
 
     def __post_init__(self) -> None:
         points = tuple(_as_vector(p, f"Polyhedron.points[{i}]") for i, p in enumerate(self.points))

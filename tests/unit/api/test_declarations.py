@@ -87,6 +87,8 @@ def test_values_are_taken_in_si(name, given, value):
         ("count", 2.5, r"Sample.count = 2.5 is not allowed"),
         ("count", math.nan, r"Sample.count = nan is not allowed"),
         ("count", math.inf, r"Sample.count = inf is not allowed"),
+        ("speed", 10**400, r"Sample.speed = 10{400} is not allowed; .* of at most 1e\+30"),
+        ("count", -(10**400), r"Sample.count = -10{400} is not allowed"),
         ("is_on", 2, r"Sample.is_on = 2 is not allowed; it takes true or false"),
         ("is_on", "maybe", r"Sample.is_on = 'maybe' is not allowed"),
         ("mode", "quick", r"Sample.mode = 'quick' is not allowed; it takes one of 'fast', 'slow'"),

@@ -340,6 +340,10 @@ def test_the_world_and_the_line_that_failed_are_named():
         ({"score": {1: 2.0}}, "Judge.result_one: 'score' has no value for team 2"),
         ({"lost": {1: 2.0, 2: 1.0, 3: 4.0}}, "Judge.result_one: 'lost': there is no team 3; there are: 1, 2"),
         ({"name": "red"}, "Judge.result_one: 'name' = 'red' is not allowed"),
+        (
+            {"many": 10**5000},
+            "Judge.result_one: 'many' is a whole number of 16,610 bits; it takes up to 1,024",
+        ),
     ],
 )
 def test_results_that_mean_nothing(result, text):

@@ -262,6 +262,17 @@ def test_values_are_compared_over_all_points_that_agree_in_the_rest():
     assert (tactic.a, tactic.b) == ("tactic=keep", "tactic=switch")
 
 
+def test_means_of_both_sides_differ_by_the_difference_also_where_runs_are_missing():
+    luck = np.random.default_rng(3).normal(size=(30, 1))
+    effect = np.array([0.0, 10.0, 1.0, 11.0])
+    failed = {4 * seed + 1: "boom" for seed in range(20)}
+    values = {2: luck + effect, 3: np.zeros((30, 4))}
+    results = Results(made_batch(values, variables=GRID, points=POINTS, failed=failed))
+    found = results.compare("score[2]", "tactic=keep", "tactic=switch")
+    assert found.n == 40
+    assert found.difference == pytest.approx(found.mean_b - found.mean_a)
+
+
 def test_pairs_of_a_seed_count_as_one_block():
     luck = np.random.default_rng(4).normal(size=(30, 1))  # for the second tactic, at both speeds
     results = Results(
@@ -329,6 +340,17 @@ def test_seeds_that_give_one_final_state_are_copies_and_not_observations():
     assert (share.low, share.high) == wilson(1, 1)
     assert np.isnan(mean.low)
     assert distinct.shares()[0].low == wilson(30, 30)[0]
+
+
+def test_runs_with_one_final_state_and_other_results_are_no_copies():
+    """A radio loses other messages in each game, which changes nothing else."""
+    lost = np.array([6.0, 10.0, np.nan, 6.0, 10.0, np.nan, 7.0, -0.0]).reshape(8, 1)
+    same = dict.fromkeys(range(8), "a" * 16)
+    zeros = np.zeros((8, 1))
+    results = Results(made_batch({2: zeros, 3: zeros}, metrics={"Radio.lost": {None: lost}}, hashes=same))
+    assert results.n_distinct == 5
+    mean = results.means(["Radio.lost"])[0]
+    assert (mean.n, mean.low < mean.value < mean.high) == (6, True)
 
 
 def test_intervals_of_points_and_comparisons_count_distinct_games():

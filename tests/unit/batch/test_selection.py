@@ -95,3 +95,19 @@ def test_points_that_agree_in_nothing_are_no_pairs():
             ParameterError, match="no point with a=1 has one with a=2 that agrees with it in x"
         ):
             paired_points(variables, some, "a=1", "a=2")
+
+
+@pytest.mark.parametrize(
+    ("values", "text", "found"),
+    [
+        ((1_000_000, 1_000_001, 1_000_002), "1000001", [1]),
+        ((2**53, 2**53 + 1), str(2**53 + 1), [1]),
+        ((0.1, 0.1000001, 0.1000002), "0.1000001", [1]),
+        ((0.1000001, 0.1000002, 0.3), "0.1", [0, 1]),  # as they are shown
+        ((-3, 3), "-3", [0]),
+        ((0, 1e-9), "0", [0]),
+    ],
+)
+def test_a_value_is_the_one_that_is_named_and_none_that_is_near(values, text, found):
+    points = [{"k": value} for value in values]
+    assert select_points([Choice("k", values)], points, f"k={text}") == found

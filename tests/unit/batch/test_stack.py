@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from math import inf, nan
 
 import gambles
 import numpy as np
@@ -10,7 +11,8 @@ import pytest
 from gambles import game
 
 from tussle import Block, Mission, Simulation
-from tussle.api import Autonomy, Handle, Metric
+from tussle.api import Autonomy, EasyMetric, Handle, Metric
+from tussle.batch import Batch, InProcess, load_batch
 from tussle.batch.stack import play, stack_size
 from tussle.batch.tasks import BatchRun, Finished, Heartbeat
 from tussle.stock import Still
@@ -231,3 +233,20 @@ def test_the_cpu_time_of_a_stack_is_shared_among_its_runs():
     assert shares.sum() == pytest.approx(spent, rel=0.2)
     # Two stacks of ten steps, each a hundredth of a second for four worlds.
     assert shares.min() > 0.02
+
+
+class Odd(EasyMetric):
+    """Numbers of any size, and a long name."""
+
+    def result_one(self, w):
+        return {"large": 10**300, "small": -2e300, "fits": 2**64, "none": nan, "x" * 200: 1.0}
+
+
+def test_metrics_beyond_what_squares_allow_are_infinite_in_a_batch(tmp_path):
+    mission = Mission(blocks=[Block(name="a", motion=Still())], metrics=[Odd()], dt=0.1, end=0.2)
+    with pytest.warns(RuntimeWarning, match="whose name has 204 characters"):
+        Batch(mission, runs=3).play(tmp_path / "batch", executor=InProcess())
+    results = load_batch(tmp_path / "batch")
+    found = [results.quantity(f"Odd.{name}")[0] for name in ("large", "small", "fits", "none")]
+    np.testing.assert_array_equal(found, [inf, -inf, 2.0**64, nan])
+    assert [mean.n for mean in results.means(["Odd.large", "Odd.fits"])] == [0, 3]

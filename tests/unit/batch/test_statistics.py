@@ -238,3 +238,10 @@ def test_pairs_are_compared_within_themselves():
     assert 0.5 < found.low < 1.0 < found.high < 1.5  # a spread of 10 between seeds, and yet
     assert (found.n_greater, found.n_less) == (int((b > a).sum()), int((b < a).sum()))
     assert found.p == sign_test(found.n_greater, found.n_less) < 1e-4
+
+
+@pytest.mark.parametrize("value", [0.0, 0.25, 1.0])
+def test_a_share_of_copies_of_one_game_has_no_interval(value):
+    found = mean_of("share", np.full(4, value), np.zeros(4, int), are_copies=True, is_share=True)
+    assert (found.value, found.n) == (value, 4)
+    assert np.isnan([found.low, found.high]).all()

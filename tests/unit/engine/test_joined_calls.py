@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tussle import Block, Mission, Simulation
-from tussle.api import Autonomy, Output, Param, Publish, State, neighbors
+from tussle.api import Autonomy, Input, MotionModel, Output, Param, Publish, State, neighbors
 from tussle.engine.joined_calls import Joined, JoinedCalls
 from tussle.errors import PluginError
 from tussle.messages import CaptureEntity
@@ -12,7 +12,15 @@ from tussle.mission import read_mission
 from tussle.numeric.kernel import kernel
 from tussle.numeric.neighbors.chain import kernel_of_chains
 from tussle.numeric.replay import Replay
-from tussle.stock import Boids, Predator, SimpleCapture, SingleIntegrator, Unicycle, UnicyclePID
+from tussle.stock import (
+    Boids,
+    NoisyContacts,
+    Predator,
+    SimpleCapture,
+    SingleIntegrator,
+    Unicycle,
+    UnicyclePID,
+)
 
 ALWAYS, NEVER = 1, 10**9
 """Numbers of steps after which calls are joined."""
@@ -208,8 +216,9 @@ def few_spans(simulation):
     for view in simulation.state.population.groups[0].views:
         for kept in view.kept.values():
             if isinstance(kept, Joined):
-                chain = next(each for each in kept.replay._bound if each._kernel is kernel_of_chains())
-                kept.replay._call[3][chain.at[4][2]] = 1
+                bound, words = kept.replay._bound, kept.replay._call[3]
+                k = next(k for k, each in enumerate(bound) if each._kernel is kernel_of_chains())
+                words[sum(len(each.words) for each in bound[:k]) + bound[k].at[4][2]] = 1
 
 
 def many_claims(simulation):
@@ -288,7 +297,7 @@ class Breaks(Spiral):
     """Does what its promise excludes, by name."""
 
     only_calls_kernels = True
-    what = Param("time", choices=("time", "draws", "publishes"))
+    what = Param("time", choices=("time", "draws", "steps", "publishes"))
     capture = Publish(CaptureEntity)
 
     def step(self, g):
@@ -296,6 +305,8 @@ class Breaks(Spiral):
             self.angle[:] = g.t
         elif self.what == "draws":
             self.angle[:] = g.uniform("angle")
+        elif self.what == "steps":
+            g.step(self, self.angle < 0.0)
         else:
             self.capture.publish([0], target=1)
         super().step(g)
@@ -303,7 +314,12 @@ class Breaks(Spiral):
 
 @pytest.mark.parametrize(
     ("what", "text"),
-    [("time", "reads the time"), ("draws", "draws 'angle'"), ("publishes", "publishes before `finish`")],
+    [
+        ("time", "reads the time"),
+        ("draws", "draws 'angle'"),
+        ("steps", "steps Breaks for some rows"),
+        ("publishes", "publishes before `finish`"),
+    ],
 )
 def test_a_plugin_that_does_more_than_it_promises_is_refused(what, text):
     with (
@@ -311,6 +327,169 @@ def test_a_plugin_that_does_more_than_it_promises_is_refused(what, text):
         pytest.raises(PluginError, match=f"Breaks promises only_calls_kernels, but {text}"),
     ):
         simulation.run()
+
+
+@kernel("F Fw -> b1")
+def goes_on(gain, turns):
+    for i in range(gain.shape[0]):
+        turns[i] += gain[i]
+    return turns[0] % 1.5 < 1.0
+
+
+@kernel("F Fw")
+def limited(gain, turns):
+    for i in range(gain.shape[0]):
+        turns[i] += gain[i]
+        if turns[i] > 5.0:
+            raise ValueError("too many turns")
+
+
+@kernel("F F Fw Fw")
+def placed(x, v, east, speed):
+    for i in range(x.shape[0]):
+        east[i], speed[i] = x[i], v[i]
+
+
+@kernel("F2 I Fw")
+def added(items, start, angle):
+    for i in range(angle.shape[0]):
+        for k in range(start[i], start[i + 1]):
+            angle[i] += 0.01 * items[2, k]
+
+
+class Pausing(Spiral):
+    """Writes a state before a kernel decides, which writes another one."""
+
+    only_calls_kernels = True
+    turns = State()
+
+    def step(self, g):
+        x, y, _ = g.components("pos")
+        spiral(x, y, self.angle, self.gain, g.dt, self.angle, *self.velocity)
+        if goes_on(self.gain, self.turns):
+            spiral(y, x, self.angle, self.gain, g.dt, self.angle, *self.velocity)
+
+
+class LateLaw(Flock):
+    """Writes a state before its law, whose blocks may need more room."""
+
+    only_calls_kernels = True
+
+    def step(self, g):
+        x, y, _ = g.components("pos")
+        spiral(x, y, self.angle, self.gain, g.dt, self.angle, *self.velocity)
+        super().step(g)
+
+
+class Watcher(Spiral):
+    """Reads a list, which is in another array whenever its sensor has written it."""
+
+    only_calls_kernels = True
+    contacts = Input(
+        fields="id team x y z vx vy vz qw qx qy qz", unit="1 1 m m m m/s m/s m/s 1 1 1 1", ragged=True
+    )
+
+    def step(self, g):
+        x, y, _ = g.components("pos")
+        added(self.contacts.data, self.contacts.start, self.angle)
+        spiral(x, y, self.angle, self.gain, g.dt, self.angle, *self.velocity)
+
+
+class Spring(MotionModel):
+    """Its bodies are placed by a kernel, after one that decides."""
+
+    only_calls_kernels = True
+    x = State("x v", unit="m m/s")
+    turns = State()
+    velocity = Input("velocity_x velocity_y velocity_z", unit="m/s")
+
+    @staticmethod
+    def derivative(x, v, velocity_x):
+        return v, 0.1 * velocity_x - x
+
+    def from_body(self, body, rows):
+        self.x[:, rows] = body.pos[0, rows], body.vel[0, rows]
+
+    def to_body(self, body):
+        if goes_on(body.radius, self.turns):
+            placed(self.x[0], self.x[1], body.pos[0], body.vel[0])
+
+
+def watched():
+    mission = swarm(Watcher())
+    return mission.replace(blocks=[mission.blocks[0].replace(sensor=NoisyContacts(max_range=20.0))])
+
+
+def sprung():
+    mission = swarm(Spiral())
+    return mission.replace(blocks=[mission.blocks[0].replace(motion=Spring(), radius=0.3)])
+
+
+@pytest.mark.parametrize(
+    "mission",
+    [swarm(Pausing(gain=0.2)), swarm(LateLaw(), 300), watched(), sprung()],
+    ids=lambda m: type(m.blocks[0].autonomy[0]).__name__,
+)
+def test_no_kernel_runs_twice_in_a_step_and_no_list_is_read_where_it_was(mission):
+    joined, apart = pair(
+        mission, [3, 4], lambda simulation, step: few_spans(simulation) if step == 12 else None, steps=20
+    )
+    assert joined == apart
+
+
+class Doubles(Spiral):
+    """Gives a kernel an array that NumPy makes in each step, or a number that differs."""
+
+    only_calls_kernels = True
+    what = Param("array", choices=("array", "number"))
+
+    def step(self, g):
+        x, y, _ = g.components("pos")
+        if self.what == "array":
+            spiral(2.0 * x, y, self.angle, self.gain, g.dt, self.angle, *self.velocity)
+        else:
+            spiral(x, y, self.angle, self.gain, float(x[0]), self.angle, *self.velocity)
+
+
+class Nearest(Spiral):
+    """Gives a kernel what a search found, and a view of what a kernel before wrote."""
+
+    only_calls_kernels = True
+
+    def step(self, g):
+        yaw, between = g.column("yaw"), np.empty((2, g.n))
+        placed(yaw, yaw, *between)
+        spiral(g.nearest().distance[0], between[1], self.angle, self.gain, g.dt, self.angle, *self.velocity)
+
+
+@pytest.mark.parametrize("autonomy", [Doubles(), Doubles(what="number"), Nearest()], ids=repr)
+def test_arrays_and_numbers_that_differ_from_step_to_step_are_not_joined(autonomy, replays):
+    joined, apart = pair(swarm(autonomy), [3, 4])
+    assert joined == apart
+    assert not (replays and isinstance(autonomy, Doubles))
+
+
+class Limited(Spiral):
+    """Its kernel raises an error."""
+
+    only_calls_kernels = True
+    turns = State()
+
+    def step(self, g):
+        limited(self.gain, self.turns)
+
+
+def test_an_error_in_a_kernel_names_the_plugin(replays):
+    mission, texts = swarm([Spiral(), Limited(), Spiral(name="last")]), []
+    for steady in (ALWAYS, NEVER):
+        with (
+            started(mission, [1], steady) as simulation,
+            pytest.raises(PluginError, match=r"Limited, a, world 0, step 10: .*too many turns") as found,
+        ):
+            simulation.run()
+        texts.append(str(found.value))
+    assert texts[0] == texts[1]
+    assert len(replays) > 3
 
 
 def test_the_list_of_calls_stays_what_it_is():

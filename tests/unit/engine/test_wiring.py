@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import inf, nan
+
 import numpy as np
 import pytest
 from small_worlds import VELOCITY, Drift, Wander, alone, block, mission
@@ -21,7 +23,8 @@ from tussle.api import (
     State,
     service,
 )
-from tussle.errors import DeclarationError, ParameterError, WiringError
+from tussle.engine.result import WorldResult
+from tussle.errors import DeclarationError, ParameterError, PluginError, WiringError
 from tussle.stock import (
     DirectController,
     NoisyState,
@@ -466,6 +469,32 @@ def test_columns_of_teams_and_worlds_for_world_plugins():
     assert sim.read("Score.pair")[0].shape == (2, 2)
     sim.reset([0])
     assert sim.read("Score.points")[0].tolist() == [[0, 0], [10, 20]]
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "text"),
+    [
+        ("east", lambda w: w.pos[0], r"Odd.result: 'east' has the shape \(10,\); it takes \(2,\), one per world or \(2, 2\)"),
+        ("n", lambda w: w.n, r"'n' has the shape \(\)"),
+        ("score", lambda w: np.zeros(w.n_worlds), r"'score' has the shape \(2,\); it takes \(2, 2\), one per team and world"),
+    ],
+)  # fmt: skip
+def test_a_result_has_one_value_per_world_or_team(name, value, text):
+    class Odd(Metric):
+        def result(self, w):
+            return {name: value(w)}
+
+    game = mission(block("a", team=7, count=2), block("b", team=3, count=3), metrics=[Odd()])
+    with pytest.raises(PluginError, match=text):
+        Simulation(game, seeds=[1, 2]).run()
+
+
+@pytest.mark.parametrize(
+    ("scores", "winner"),
+    [({1: nan, 2: 5.0}, None), ({1: 5.0, 2: nan}, None), ({1: -inf, 2: inf}, 2), ({1: inf, 2: inf}, None), ({4: 0.0}, 4)],
+)  # fmt: skip
+def test_nobody_wins_against_a_score_that_is_no_number(scores, winner):
+    assert WorldResult(0, 1, "time", 1, 0.1, {}, scores=scores).winner == winner
 
 
 def test_a_model_with_a_switched_off_input_reads_the_other_one():

@@ -9,6 +9,7 @@ from gymnasium.utils.env_checker import check_env
 
 from tussle.errors import ParameterError
 from tussle.rl import (
+    Act,
     Computed,
     Dispersal,
     NearestOthers,
@@ -130,6 +131,26 @@ class Choosy(NearOrigin):
     def action_mask(self, now):
         east = now.pos[..., 0] > 0.0
         return np.stack([np.ones_like(east), ~east], axis=-1)
+
+
+class TwoChoices(NearOrigin):
+    """A robot that chooses among three speeds to the east, of which one is excluded, and two to the north."""
+
+    action = (
+        Act("velocity_x", levels=[-1.0, 0.0, 1.0]), Act("velocity_y", levels=[-1.0, 1.0]), Act("velocity_z", value=0.0),
+    )  # fmt: skip
+
+    def action_mask(self, now):
+        return np.broadcast_to([True, False, True, True, False], (*now.alive.shape, 5))
+
+
+def test_a_mask_of_several_actions_is_split_for_their_space():
+    env = parallel_env(TwoChoices())
+    _, infos = env.reset(seed=1)
+    (name,) = env.agents
+    space, mask = env.action_space(name), infos[name]["action_mask"]
+    chosen = [space.sample(tuple(np.split(mask, np.cumsum(space.nvec)[:-1]))).tolist() for _ in range(30)]
+    assert {tuple(each) for each in chosen} == {(0, 0), (2, 0)}
 
 
 @pytest.mark.filterwarnings("ignore:.*observation space m:UserWarning")

@@ -156,6 +156,22 @@ def test_boxes_end_at_the_edges_of_the_image_and_cameras_are_mounted():
     assert boxes(still("o", (50.0, 0.0, 0.0)), ignore_real_entities=True).shape == (5, 0)
 
 
+@pytest.mark.parametrize(
+    ("way", "is_seen"),
+    [
+        ((1.0, 0.99, 0.4), True),
+        ((1.0, -0.99, -0.4), True),
+        ((1.0, 0.8, 0.5), False),  # 21 degrees above the horizontal plane, and 27 above the optical axis
+        ((1.0, 0.0, 0.42), False),
+        ((1.0, 1.01, 0.0), False),
+    ],
+)
+def test_what_is_beyond_an_edge_of_the_image_is_not_in_it(way, is_seen):
+    found = boxes(still("o", tuple(50.0 * np.array(way))), azimuth_fov="90", elevation_fov="45")
+    assert found.shape == (5, is_seen)
+    assert (found[3:] > 0.0).all()
+
+
 def test_boxes_are_missed_err_and_are_invented():
     noise = {"pos_noise_0": (3.0, 2.0), "size_noise_1": (0.0, 4.0), "false_negative_probability": 0.2}
     ids, u, _, _, height = boxes(

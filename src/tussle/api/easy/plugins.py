@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterable, Mapping
 from typing import Any, ClassVar
 
@@ -178,6 +179,10 @@ def _number(where: str, value: Any) -> Any:
     number = value.item() if isinstance(value, np.generic) else value
     if not isinstance(number, (bool, int, float)):
         raise ParameterError(f"{where} = {value!r} is not allowed; it takes a number, or {{team: number}}")
+    if isinstance(number, int) and abs(number) > sys.float_info.max:
+        raise ParameterError(
+            f"{where} is a whole number of {number.bit_length():,} bits; it takes up to 1,024"
+        )
     return number
 
 

@@ -158,7 +158,7 @@ def _best_value(data: ReportData, lead: Measure, axis: FittedVariable) -> str:
 
 def _side(data: ReportData, name: str, value: Any) -> int | str:
     points = data.points_with({name: value})
-    return points[0] if len(points) == 1 else f"{name}={written(value)}"
+    return points[0] if len(points) == 1 else f"{name}={value}"
 
 
 def _crossover(

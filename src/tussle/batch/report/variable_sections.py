@@ -358,7 +358,7 @@ def _compared(data: ReportData, axis: FittedVariable, measure: Measure) -> list[
     sides: list[int | str] = []
     for value in axis.values:
         points = data.points_with({axis.variable.name: value})
-        sides.append(points[0] if len(points) == 1 else f"{axis.variable.name}={written(value)}")
+        sides.append(points[0] if len(points) == 1 else f"{axis.variable.name}={value}")
     return [data.results.compare(measure.expression, sides[0], side) for side in sides[1:]]
 
 

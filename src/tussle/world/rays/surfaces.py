@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -72,7 +73,7 @@ class HeightField:
             4,000,000 heights.
     """
 
-    height: np.ndarray
+    height: Any
     west: float = 0.0
     south: float = 0.0
     cell: float = 1.0
@@ -193,8 +194,8 @@ class TriangleMesh:
         ParameterError: A coordinate is not finite or too large, a corner does not exist, or there are no triangles, or more than 2,000,000.
     """
 
-    vertices: np.ndarray
-    faces: np.ndarray
+    vertices: Any
+    faces: Any
     tag: tuple[tuple[str, str], ...] = ()
     parts: tuple[MeshPart, ...] = ()
     normals: np.ndarray = field(init=False)

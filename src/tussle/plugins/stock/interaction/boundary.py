@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from functools import lru_cache
 
 import numpy as np
@@ -138,6 +139,6 @@ def _volume(
     return Cuboid(center=center, lengths=lengths, rpy=rpy)
 
 
-def _mean(points: tuple[tuple[float, ...], ...]) -> tuple[float, ...]:
+def _mean(points: Sequence[Sequence[float]]) -> tuple[float, ...]:
     """Mean of points."""
     return tuple(total(values) / len(points) for values in zip(*points, strict=True))

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from tussle.api import GroupView, HistoricAttributes, Output, Param, Sensor
-from tussle.numeric import atan2, tan
+from tussle.numeric import tan
 from tussle.numeric.quaternion import quat_from_euler, quat_multiply, quat_rotate_inverse
 
 PAIR = "mean sd"
@@ -24,7 +24,8 @@ class ContactBlobCamera(Sensor):
     `occlusion`, an entity whose centre is hidden is not seen. Set `rate` for a lower frame rate than that of the steps.
 
     In SCRIMMAGE the size is the widest chord's, and each detected entity brings its own false positives of its own size,
-    one more than `max_false_positives_per_frame`, and none come without one. Its focal length cancels.
+    one more than `max_false_positives_per_frame`, and none come without one. Its focal length cancels. It also lists entities above and
+    below the corners of the image, whose elevation over the horizontal plane of the camera is within `elevation_fov`.
     """
 
     grade = "portable"
@@ -91,16 +92,16 @@ class ContactBlobCamera(Sensor):
         near = g.near(self.max_detect_range)
         quat = quat_multiply(g.quat, quat_from_euler(*self.rpy))
         x, y, z = quat_rotate_inverse(quat[:, near.row], near.offset)
-        row, side, up = near.row, 0.5 * self.azimuth_fov, 0.5 * self.elevation_fov
-        is_seen = (abs(atan2(y, x)) <= side[row]) & (abs(atan2(z, np.sqrt(x * x + y * y))) <= up[row])
-        is_seen &= (x > 0.0) & ~self.ignore_real_entities[row]
+        row, side, up = near.row, tan(0.5 * self.azimuth_fov), tan(0.5 * self.elevation_fov)
+        is_seen = (x > 0.0) & (abs(y) <= x * side[row]) & (abs(z) <= x * up[row])
+        is_seen &= ~self.ignore_real_entities[row]
         is_seen &= g.uniform_pairs("missed", near) >= self.false_negative_probability[row]
         if self.occlusion:
             is_seen[is_seen] = g.line_of_sight(row[is_seen], near.other[is_seen])
         near, row, x, y, z = near[is_seen], row[is_seen], x[is_seen], y[is_seen], z[is_seen]
         noise = g.normal_pairs("noise", near, 4)
-        across = self.img_width, tan(side), -y, (self.pos_noise_0, self.size_noise_0), noise[0::2]
-        down = self.img_height, tan(up), -z, (self.pos_noise_1, self.size_noise_1), noise[1::2]
+        across = self.img_width, side, -y, (self.pos_noise_0, self.size_noise_0), noise[0::2]
+        down = self.img_height, up, -z, (self.pos_noise_1, self.size_noise_1), noise[1::2]
         (u, width), (v, height) = (
             _extent(x, offset, near.radius, size[row], half[row], [e[:, row] for e in errors], draws)
             for size, half, offset, errors, draws in (across, down)

@@ -153,7 +153,7 @@ def _footprint(region: Region) -> np.ndarray:
     """Corners of what a bounded shape covers seen from above [m], (k, 2), counter-clockwise."""
     shape = region.shape
     if isinstance(shape, Sphere):
-        return _circle(*shape.center[:2], shape.radius)
+        return _circle(shape.center[0], shape.center[1], shape.radius)
     if isinstance(shape, Prism):
         corners = np.array(shape.corners)
         x, y = corners.T
