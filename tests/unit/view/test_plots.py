@@ -149,9 +149,7 @@ def test_a_run_without_states_is_told(collided, tmp_path):
     cut = tmp_path / "cut"
     shutil.copytree(collided, cut)
     data = (cut / "trajectory.arrow").read_bytes()
-    (cut / "trajectory.arrow").write_bytes(
-        data[: len(data) // 2]
-    )  # all states lie in one batch, which is lost
+    (cut / "trajectory.arrow").write_bytes(data[:1000])  # in the first batch, which is lost
     with pytest.raises(ViewError, match="cut: nothing was recorded"):
         Trajectories(Recording(cut))
 

@@ -14,8 +14,8 @@ FAR = 1e150
 """Speed that does not count [m/s]: its square would overflow."""
 
 
-@kernel(f"(F F F F) F2 f8 (I I) (B B) (Iw Iw Iw Iw Iw) (I I I I) i8 {TABLE} -> b1")
-def hunt(points, vel, dt, teams, options, out, rows, first, arrays):
+@kernel(f"(F F F F) (I I B B) (F2 f8) (Iw Iw Iw Iw Iw) (I I I I) i8 {TABLE} -> b1")
+def hunt(points, options, motion, out, rows, first, arrays):
     """Choose targets and collect claims for the rows of a group that begins at row `first` of the table.
 
     A target is kept while it lives and switching is not allowed; else the nearest entity of prey_team is chosen (on ties the
@@ -24,12 +24,10 @@ def hunt(points, vel, dt, teams, options, out, rows, first, arrays):
 
     Args:
         points: x, y, z and capture_range [m], (n,) each, by row of the group.
-        vel: Velocities of the body table [m/s], (3, N).
-        dt: Duration of the step [s].
-        teams: Own team and prey_team, (n,).
-        options: allow_switching, whether the nearest prey is chosen in every step, and between_steps, (n,).
+        options: Own team, prey_team, allow_switching, whether the nearest prey is chosen in every step, and between_steps, (n,) each.
+        motion: Velocities of the body table [m/s], (3, N), and duration of the step [s].
         out: target, the id of the prey or 0, (n,); target_row, its row of the body table or -1, (n,); claim_row, row of the group,
-            and claim_place, row of the body table, per claim, as many as fit; count, their number, or more if they do not fit, (1,);
+            and claim_place, row of the body table, per claim, as many as fit; count, their number, or a room if they do not fit, (1,);
             written.
         rows: id, world and place of each row of the body table; row of each place.
         first: First row of the group in the body table.
@@ -39,8 +37,8 @@ def hunt(points, vel, dt, teams, options, out, rows, first, arrays):
         Whether there was room for all claims.
     """
     x, y, z, capture_range = points
-    own_team, prey_team = teams
-    allow_switching, between_steps = options
+    own_team, prey_team, allow_switching, between_steps = options
+    vel, dt = motion
     target, target_row, claim_row, claim_place, count = out
     row_id, row_world, place, order = rows
     table = table_of(arrays)
@@ -48,8 +46,9 @@ def hunt(points, vel, dt, teams, options, out, rows, first, arrays):
     fastest = np.zeros(table[0].shape[0])
     for j in range(row_world.shape[0]):
         speed = math.sqrt(vel[0, j] * vel[0, j] + vel[1, j] * vel[1, j] + vel[2, j] * vel[2, j])
-        if fastest[row_world[j]] < speed < FAR:
-            fastest[row_world[j]] = speed
+        w = row_world[j]
+        if fastest[w] < speed < FAR:
+            fastest[w] = speed
     best, ranks, places = np.empty(1), np.empty(1, np.int64), np.empty(1, np.int64)
     n_claims = np.int64(
         0
@@ -79,8 +78,8 @@ def hunt(points, vel, dt, teams, options, out, rows, first, arrays):
             n_claims,
         )
         if until > room:
-            n_claims = until
-            continue
+            count[0] = 2 * until
+            return False
         for k in range(n_claims, until):
             p = claim_place[k]
             j = order[p]
@@ -102,7 +101,7 @@ def hunt(points, vel, dt, teams, options, out, rows, first, arrays):
             claim_place[n_claims] = j
             n_claims += 1
     count[0] = n_claims
-    return n_claims <= room
+    return True
 
 
 @kernel("(F F F) (F F F F) F I F2 (Fw Fw Fw)")

@@ -51,8 +51,8 @@ class Predator(Autonomy):
         while not fits:  # repeat with more room if the claims did not fit; the targets do not change
             claims, n_claims = (np.empty(room, np.int64), np.empty(room, np.int64)), np.empty(1, np.int64)
             fits = kernels.hunt(
-                (x, y, z, self.capture_range), bodies.vel, g.dt, (g.team, self.prey_team_id),
-                (self.allow_prey_switching, self.between_steps), (self.target, target_row, *claims, n_claims), rows, g.first, table,
+                (x, y, z, self.capture_range), (g.team, self.prey_team_id, self.allow_prey_switching, self.between_steps),
+                (bodies.vel, g.dt), (self.target, target_row, *claims, n_claims), rows, g.first, table,
             )  # fmt: skip
             room = int(n_claims[0])
         wired = self.wired
