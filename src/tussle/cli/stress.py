@@ -48,6 +48,7 @@ def stress(options: StressOptions) -> int:
     study = Stress(
         options.mission,
         options.spec,
+        guide=options.guide,
         first_seed=1 if options.seed is None else options.seed,
         settings=options.given,
         plugin_files=tuple(options.plugin_files),
