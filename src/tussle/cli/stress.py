@@ -74,7 +74,7 @@ def stress(options: StressOptions) -> int:
             nonlocal n
             n += 1
             interrupt.check()
-            meter.show(n, None if options.probability else options.games)
+            meter.show(n, None if options.probability else options.games * (1 + len(study.others)))
 
         how: dict[str, Any] = {"processes": options.processes, "stack": options.stack, "on_game": on_game}
         try:

@@ -244,7 +244,7 @@ class Factory:
         return LENGTH, lambda f: f.least_distance(a, b)
 
     def of_approach(self, these: str, others: str, speed: str) -> tuple[Dimension | None, Evaluate]:
-        """Least distance at which an entity passes another one if both fly straight on, where each second until then counts as so far [m]."""
+        """Least distance at which an entity passes another one if both fly straight on; each second until then counts as so far [m]."""
         a, b = self.selection(these), self.selection(others)
         per_second = units.parse(speed, "m/s")
         return LENGTH, lambda f: f.least_approach(a, b, per_second)

@@ -186,9 +186,9 @@ def test_a_guide_finds_the_same_probability(found):
 def test_a_guide_of_the_end_alone_or_of_a_search_is_of_no_use():
     late = study(guide="lost[1] < 1").probability(4, 2)
     assert "nothing is known of this specification before a game ends" in late.notes[0]
-    with pytest.raises(ParameterError, match="there is no signal 'aproach' .did you mean 'approach'"):
+    with pytest.raises(ParameterError, match="did you mean 'approach'"):
         study(guide="always (aproach(left, right, 1 m/s) > 3 m)")
-    with pytest.raises(ParameterError, match="a guide is for `probability`"):
+    with pytest.raises(ParameterError, match="a guide is for"):
         study(guide=TEXT, vary={"left.Hover.gain": (0.3, 1)}).search(10)
 
 
