@@ -105,21 +105,22 @@ def least_by_sweep(pos, is_a, is_b, start, out):
         out[w] = math.sqrt(least)
 
 
-@kernel("F2 F2 I I F2 F2 I I f8 Fw")
-def least_approach(pos_a, vel_a, row_a, start_a, pos_b, vel_b, row_b, start_b, per_second, out):
+@kernel("(F2 F2 I I) (F2 F2 I I) f8 Fw")
+def least_approach(a, b, per_second, out):
     """Least approach [m] of each world between an entity a and another b; inf without a pair.
 
     The approach of two is sqrt(d^2 + (per_second t)^2), where d [m] is their least distance if they fly straight on, and t [s] the time
     until then; at most their distance, and no less for those that part.
 
     Args:
-        pos_a: Positions [m], (3, n), by world; pos_b likewise.
-        vel_a: Velocities [m/s], (3, n); vel_b likewise.
-        row_a: Which entities they are; row_b likewise.
-        start_a: Entities a of world w are the columns start_a[w] to start_a[w + 1]; start_b likewise.
+        a: Positions [m], (3, n), by world; velocities [m/s], (3, n); which entities they are, (n,); those of world w are start[w] to
+            start[w + 1].
+        b: The same of the others.
         per_second: What a second counts [m/s].
         out: Receives the approach.
     """
+    pos_a, vel_a, row_a, start_a = a
+    pos_b, vel_b, row_b, start_b = b
     for w in range(len(out)):
         least = np.inf
         for i in range(start_a[w], start_a[w + 1]):

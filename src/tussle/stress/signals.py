@@ -151,9 +151,10 @@ class StepView:
     def least_approach(self, a: ChosenEntities, b: ChosenEntities, per_second: float) -> np.ndarray:
         """Least approach of an entity a to another b [m], (n_worlds,), see `kernels.least_approach`; inf without a pair."""
         out, pos, vel = np.empty(self.bodies.n_worlds), self.bodies.pos, self.bodies.vel
-        chosen: list[np.ndarray] = []
-        for rows, start in (self.rows.of(a), self.rows.of(b)):
-            chosen += np.take(pos, rows, axis=1), np.take(vel, rows, axis=1), rows, start
+        chosen = [
+            (np.take(pos, rows, axis=1), np.take(vel, rows, axis=1), rows, start)
+            for rows, start in (self.rows.of(a), self.rows.of(b))
+        ]
         kernels.least_approach(*chosen, per_second, out)
         return out
 
