@@ -225,6 +225,13 @@ class StressOptions(ManyGamesOptions):
         bool,
         flag("--shrink", "Make the worst failing game as small as it can be, as failures/smallest.xml."),
     ] = False
+    guide: Annotated[
+        str,
+        option(
+            "SPEC",
+            "With --probability: what games break on their way to a failure: 'always (approach(all, all, 1 m/s) > 1 m)'.",
+        ),
+    ] = ""
     particles: Annotated[
         int,
         option("N", "With --probability: games at a time, of each repetition.", min=2, shows_default=True),
@@ -269,6 +276,8 @@ class StressOptions(ManyGamesOptions):
             raise typer.BadParameter(
                 "--probability and --holds are for one mission with one set of values; not with --vary and --against, but for --importance"
             )
+        if self.guide and (not self.probability or self.importance):
+            raise typer.BadParameter("--guide needs --probability, without --importance")
         if not self.spec:
             raise typer.BadParameter(
                 "--spec is missing: what must hold, such as 'always (distance(team 1, team 1) > 2 m)'"

@@ -50,6 +50,7 @@ def stress(options: StressOptions) -> int:
     study = Stress(
         options.mission,
         options.spec,
+        guide=options.guide,
         first_seed=1 if options.seed is None else options.seed,
         settings=options.given,
         plugin_files=tuple(options.plugin_files),
@@ -75,7 +76,7 @@ def stress(options: StressOptions) -> int:
             nonlocal n
             n += 1
             interrupt.check()
-            meter.show(n, None if options.probability else options.games)
+            meter.show(n, None if options.probability else options.games * (1 + len(study.others)))
 
         how: dict[str, Any] = {"processes": options.processes, "stack": options.stack, "on_game": on_game}
         try:

@@ -253,6 +253,20 @@ def records(known: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return falls, known[falls]
 
 
+def guided(known: np.ndarray, guide: np.ndarray) -> np.ndarray:
+    """One score of a game for splitting, (n,), which never rises: first by a guide until that is broken, and then by the specification.
+
+    It is negative where the specification is broken, from 0 to 1 where only the guide is, and 1 or more before.
+
+    Args:
+        known: What the robustness of the specification is at most, (n,).
+        guide: What that of the guide is at most, (n,).
+    """
+    far = np.maximum(known, 0.0)
+    nearer = np.where(guide < 0.0, 1.0 - 1.0 / (1.0 + far), 1.0 + guide)
+    return np.where(known < 0.0, known, nearer)
+
+
 def mean_of(values: Sequence[float]) -> float:
     """Mean of some numbers, the same in any environment."""
     return float(total(np.asarray(values, dtype=np.float64))) / len(values)

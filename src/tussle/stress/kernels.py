@@ -105,6 +105,38 @@ def least_by_sweep(pos, is_a, is_b, start, out):
         out[w] = math.sqrt(least)
 
 
+@kernel("(F2 F2 I I) (F2 F2 I I) f8 Fw")
+def least_approach(a, b, per_second, out):
+    """Least approach [m] of each world between an entity a and another b; inf without a pair.
+
+    The approach of two is sqrt(d^2 + (per_second t)^2), where d [m] is their least distance if they fly straight on, and t [s] the time
+    until then; at most their distance, and no less for those that part.
+
+    Args:
+        a: Positions [m], (3, n), by world; velocities [m/s], (3, n); which entities they are, (n,); those of world w are start[w] to
+            start[w + 1].
+        b: The same of the others.
+        per_second: What a second counts [m/s].
+        out: Receives the approach.
+    """
+    pos_a, vel_a, row_a, start_a = a
+    pos_b, vel_b, row_b, start_b = b
+    for w in range(len(out)):
+        least = np.inf
+        for i in range(start_a[w], start_a[w + 1]):
+            for j in range(start_b[w], start_b[w + 1]):
+                x, y, z = pos_b[0, j] - pos_a[0, i], pos_b[1, j] - pos_a[1, i], pos_b[2, j] - pos_a[2, i]
+                u, v, s = vel_a[0, i] - vel_b[0, j], vel_a[1, i] - vel_b[1, j], vel_a[2, i] - vel_b[2, j]
+                square, closing, speed = x * x + y * y + z * z, x * u + y * v + z * s, u * u + v * v + s * s
+                if closing > 0.0:
+                    time = closing / speed
+                    ahead = max(square - closing * time, 0.0) + per_second * per_second * time * time
+                    square = min(square, ahead)
+                if square < least and row_a[i] != row_b[j]:
+                    least = square
+        out[w] = math.sqrt(least)
+
+
 @kernel("F2 I f8 Fw Fw")
 def spanning_tree(pos, start, reach, longest, parts):
     """Of the minimum spanning tree of each world's entities (Prim 1957): its longest link [m], and connected parts for a range.

@@ -12,7 +12,7 @@ import numpy as np
 from tussle.api.bodies import Bodies
 from tussle.engine.simulation import Simulation
 from tussle.mission import Mission
-from tussle.stress.formulas import records
+from tussle.stress.formulas import guided, records
 from tussle.stress.signals import ChosenRows, StepView
 from tussle.stress.specification import Function, Specification, columns_of
 
@@ -26,8 +26,8 @@ class Verdict:
 
     Attributes:
         robustness: Distance from failure, in the unit of what is compared; negative for a failure.
-        steps: Steps at which the robustness that is known to be reached at most falls, ascending.
-        levels: What it falls to, descending; the last is the robustness.
+        steps: Steps at which the score falls, ascending: what the robustness is at most, as known then, or with a guide `formulas.guided`.
+        levels: What it falls to, descending; the last is the score of the game, negative for a failure.
     """
 
     robustness: float
@@ -38,6 +38,11 @@ class Verdict:
     def has_failed(self) -> bool:
         """The specification is broken."""
         return self.robustness < 0.0
+
+    @property
+    def score(self) -> float:
+        """How near the game came to a failure: its robustness, or with a guide that of `formulas.guided`."""
+        return self.levels[-1]
 
     def first_below(self, level: float) -> int | None:
         """The first step at which the game is known to be nearer to failure than a level; None for never."""
@@ -53,11 +58,15 @@ class Monitor:
     Args:
         specification: What must hold.
         sim: The simulation, before its first step.
+        guide: A specification that games break on their way to a failure; None for the specification alone.
     """
 
-    def __init__(self, specification: Specification, sim: Simulation) -> None:
-        self.specification, self.sim = specification, sim
-        self._signals = list(specification.signals.values())
+    def __init__(
+        self, specification: Specification, sim: Simulation, guide: Specification | None = None
+    ) -> None:
+        self.specification, self.sim, self.guide = specification, sim, guide
+        signals = {} if guide is None else guide.signals
+        self._signals = list((specification.signals | signals).values())
         self._samples = np.full((len(self._signals), ROOM, sim.n_worlds), np.nan)
         self._rows = ChosenRows(sim.state.population.bodies)
         self._verdicts: dict[int, Verdict] = {}
@@ -116,8 +125,11 @@ class Monitor:
             is_over = not self.sim.state.running[world]
             if result is None or not is_over:
                 result = self.sim.result(is_hashed=False)[world]
-            known = self.specification.known(self.trace(world), columns_of(result))
-            steps, levels = records(known)
+            signals, columns = self.trace(world), columns_of(result)
+            score = known = self.specification.known(signals, columns)
+            if self.guide is not None:
+                score = guided(known, self.guide.known(signals, columns))
+            steps, levels = records(score)
             if not len(steps):  # nothing is compared, as in windows after the end
                 steps, levels = np.array([0]), np.array([np.inf])
             verdict = Verdict(float(known[-1]), steps.tolist(), levels.tolist())
@@ -181,10 +193,12 @@ class Watching:
     Attributes:
         given: The specification: a text, or a function that is to be positive.
         functions: Its signals that are functions.
+        guide_text: What guides splitting beside it, as of `Monitor`; "" for nothing.
     """
 
     given: str | Function
     functions: Mapping[str, Function] = field(default_factory=dict)
+    guide_text: str = ""
 
     def specification(self, mission: Mission) -> Specification:
         """The specification of a mission.
@@ -196,5 +210,13 @@ class Watching:
             return Specification.parse(self.given, mission, self.functions)
         return Specification.of_function(self.given, mission)
 
+    def guide(self, mission: Mission) -> Specification | None:
+        """The guide of a mission.
+
+        Raises:
+            ParameterError: The text is no specification, or names what the mission does not have.
+        """
+        return Specification.parse(self.guide_text, mission, self.functions) if self.guide_text else None
+
     def __call__(self, sim: Simulation) -> Monitor:
-        return Monitor(self.specification(sim.mission), sim)
+        return Monitor(self.specification(sim.mission), sim, self.guide(sim.mission))

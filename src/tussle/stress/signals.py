@@ -161,6 +161,16 @@ class StepView:
             )
         return out
 
+    def least_approach(self, a: ChosenEntities, b: ChosenEntities, per_second: float) -> np.ndarray:
+        """Least approach of an entity a to another b [m], (n_worlds,), see `kernels.least_approach`; inf without a pair."""
+        out, pos, vel = np.empty(self.bodies.n_worlds), self.bodies.pos, self.bodies.vel
+        chosen = [
+            (np.take(pos, rows, axis=1), np.take(vel, rows, axis=1), rows, start)
+            for rows, start in (self.rows.of(a), self.rows.of(b))
+        ]
+        kernels.least_approach(*chosen, per_second, out)
+        return out
+
 
 Evaluate = Callable[[StepView], np.ndarray]
 
@@ -251,6 +261,12 @@ class Factory:
         b = self.selection(others)
 
         return LENGTH, lambda f: f.least_distance(a, b)
+
+    def of_approach(self, these: str, others: str, speed: str) -> tuple[Dimension | None, Evaluate]:
+        """Least distance at which an entity passes another one if both fly straight on; each second until then counts as so far [m]."""
+        a, b = self.selection(these), self.selection(others)
+        per_second = units.parse(speed, "m/s")
+        return LENGTH, lambda f: f.least_approach(a, b, per_second)
 
     def of_max_distance(self, these: str, place: str) -> tuple[Dimension | None, Evaluate]:
         """Greatest distance of an entity from a point [m]; -inf without one."""

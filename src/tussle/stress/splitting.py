@@ -2,7 +2,7 @@
 
 Cérou and Guyader (2007, "Adaptive multilevel splitting for rare event analysis"); the form for ties and discrete time whose estimate is
 unbiased for any number of games and any score: Bréhier et al. (2016, "Unbiasedness of some generalized adaptive multilevel splitting
-algorithms"), section 3. The score of a game at a step is the negative of its robustness as known there, which never falls.
+algorithms"), section 3. The score of a game at a step is its robustness as known there, or that of a guide, which never rises.
 
 A repetition plays n games. In each round, those that stayed farthest from failure are replaced by branches of others: each is the game of
 a random survivor up to the first step at which it was nearer to failure than the level of the round, and then has other luck. A branch is
@@ -25,6 +25,9 @@ from tussle.stress.games import Played, StressGame
 
 CHOICE = stream_key("stress", "survivor")
 
+MIN_PROBABILITY = 1e-15
+"""Below it a repetition ends as if no game had come nearer: where branches do not differ, levels creep on without end."""
+
 Play = Callable[[Sequence[StressGame]], Sequence[Played]]
 
 
@@ -35,7 +38,7 @@ class Repetition:
     Attributes:
         number: Its number.
         probability: Its estimate.
-        levels: Robustness at which games were replaced, of each round.
+        levels: Score at which games were replaced, of each round.
         shares: Part of the games that was replaced, of each round.
         n_games: Games that it played.
         n_ancestors: Games of the start from which those at the end descend.
@@ -70,19 +73,20 @@ def repetition(
     """
     games = [StressGame((first_seed + number * n + i) % 2**64) for i in range(n)]
     played = list((yield games))
-    robustness = np.array([p.verdict.robustness for p in played])
+    score = np.array([p.verdict.score for p in played])
     result.n_games = n
     round_ = 0
     while True:
-        level = float(np.sort(robustness)[n - n_replaced])
+        level = float(np.sort(score)[n - n_replaced])
         if level < 0.0:
             break
-        is_lost = robustness >= level
+        is_lost = score >= level
         survivors, lost = np.flatnonzero(~is_lost), np.flatnonzero(is_lost)
         result.levels.append(level)
         result.shares.append(len(lost) / n)
         result.probability *= len(survivors) / n
-        if not len(survivors):
+        if result.probability < MIN_PROBABILITY:
+            result.probability = 0.0
             return
         draws = uniform(first_seed % 2**64, CHOICE, lost, np.full(len(lost), round_), number)[0]
         parents = survivors[np.minimum((draws * len(survivors)).astype(np.int64), len(survivors) - 1)]
@@ -93,7 +97,7 @@ def repetition(
             key = stream_key("stress", "branch", f"{first_seed} {number} {round_} {place}")
             branches.append(played[parent].game.branch(step, key))
         found = yield branches
-        robustness[lost] = [branch.verdict.robustness for branch in found]
+        score[lost] = [branch.verdict.score for branch in found]
         for place, branch in zip(lost.tolist(), found, strict=True):
             played[place] = branch
         result.n_games += len(lost)

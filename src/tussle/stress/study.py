@@ -57,6 +57,7 @@ class Stress:
         specification: What must hold: a text as of `Specification.parse`, or a function of the simulation that returns one number per
             world, positive at all steps of a good game.
         functions: Signals that the text calls as name(): functions like that.
+        guide: For `probability`: a specification that games break on their way to a failure. Splitting goes by it until it is broken.
         first_seed: Seeds of the games count up from here.
         settings: Values that are set, as for `read_mission` or by path.
         plugin_files: Python files whose plugins the mission file may name.
@@ -78,6 +79,7 @@ class Stress:
         specification: str | Function,
         *,
         functions: Mapping[str, Function] | None = None,
+        guide: str = "",
         first_seed: int = 1,
         settings: Mapping[str, Any] | None = None,
         plugin_files: Sequence[str | Path] = (),
@@ -113,8 +115,9 @@ class Stress:
             self.variables = tuple(with_whole_numbers(mission, given, self.variables, **reading))
         self._made: dict[StressGame, Mission] = {}
         self._written: tuple[Path, dict[str, Any]] | None = None  # the result that was written last
-        self.watching = Watching(specification, dict(functions or {}))
+        self.watching = Watching(specification, dict(functions or {}), guide)
         self.specification: Specification = self.watching.specification(self.mission)
+        self.guide = self.watching.guide(self.mission)
 
     @property
     def mission(self) -> Mission:
@@ -136,6 +139,8 @@ class Stress:
             "specification": str(self.specification),
             "first_seed": self.first_seed,
         }
+        if self.guide is not None:
+            contents["guide"] = str(self.guide)
         if self.variables:
             contents["variables"] = list(map(variable_entry, self.variables))
         if self.distributions:
@@ -223,6 +228,8 @@ class Stress:
         check_argument("games", games, Whole(1, 10**6))
         check_argument("per_round", per_round, Whole(4, 10**4))
         check_argument("sample_seed", sample_seed, Whole(0, 2**32 - 1))
+        if self.guide is not None:
+            raise ParameterError("a guide is for `probability`; a search goes by the specification alone")
         if self.distributions:
             raise ParameterError("a search takes ranges, as 20:30; distributions are for `importance`")
         if not self.variables and not self.others:
@@ -483,7 +490,7 @@ class Stress:
         repetitions, n = found.repetitions, len(found.repetitions)
         extinct = [r for r in repetitions if r.is_extinct]
         notes = []
-        if not self.specification.can_guide:
+        if not (self.guide or self.specification).can_guide:
             notes.append(
                 "nothing is known of this specification before a game ends, so splitting cannot tell good games from better ones; "
                 "it needs a condition under always"

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from tussle import Simulation
+from tussle.errors import ParameterError
 from tussle.mission import read_mission
 from tussle.stress import Monitor, Specification
 from tussle.stress.kernels import SWEEP_FROM
@@ -62,6 +63,19 @@ def links(points):
         return np.zeros(0)
     d = np.linalg.norm(np.array(points)[:, None] - np.array(points)[None], axis=2)
     return minimum_spanning_tree(d).data
+
+
+def approach(these, others, per_second):
+    """Least approach of bodies (team, position, velocity), looked for along fine steps of time."""
+    t, least = np.linspace(0.0, 100.0, 4001), ENDLESS
+    for _, p, v in these:
+        for _, q, u in others:
+            if p is not q:
+                offset, closing = np.subtract(q, p), np.subtract(v, u)
+                d = np.sqrt(np.square(offset[:, None] - closing[:, None] * t).sum(axis=0))
+                k = d.argmin()
+                least = min(least, d[0], np.hypot(d[k], per_second * t[k]))
+    return least
 
 
 POINT = np.array([10.0, 20.0, 30.0])
@@ -130,6 +144,34 @@ def test_the_sweep_over_large_swarms_is_the_least_of_all_pairs():
     assert trace("distance(prey, prey)", sim).trace(0)["distance(prey, prey)"][0] == pytest.approx(
         d.min(), rel=1e-12
     )
+
+
+@pytest.mark.parametrize("per_second", [0.0, 3.0, 1e6])
+@pytest.mark.parametrize("others", [1, 2])
+def test_an_approach_is_how_near_two_come_if_they_fly_on(others, per_second):
+    sim = Simulation(MISSION, 5)
+    sim.step(7)
+    bodies = positions(sim)
+    mine = [b for b in bodies if b[0] == 1]
+    text = f"approach(team 1, team {others}, {per_second:.0f} m/s)"
+    found = trace(text, sim).trace(0)[text][-1]
+    expected = approach(mine, [b for b in bodies if b[0] == others], per_second)
+    assert found == pytest.approx(expected, rel=0.01)
+    if per_second == 1e6:  # only what is near now counts
+        assert (
+            found
+            == trace(f"distance(team 1, team {others})", sim).trace(0)[f"distance(team 1, team {others})"][-1]
+        )
+
+
+def test_an_approach_needs_a_pair_and_a_speed():
+    sim = Simulation(MISSION, 5)
+    alone = "approach(entity 3, entity 3, 1 m/s)"
+    assert trace(alone, sim).trace(0)[alone] == [np.inf]
+    with pytest.raises(ParameterError, match="approach\\(\\) takes 3 arguments, not 2"):
+        trace("approach(all, all)", sim)
+    with pytest.raises(ParameterError, match="m/s"):
+        trace("approach(all, all, 2 kg)", sim)
 
 
 SPECS = (

@@ -6,9 +6,11 @@ import math
 
 import numpy as np
 import pytest
-from walks import PROCESSES, brownian, chain, gap
+from walks import NORMAL, PROCESSES, brownian, chain, gap, playing
 
 from tussle.numeric.kernel import collecting_later
+from tussle.stress import Played, Verdict
+from tussle.stress.formulas import guided
 from tussle.stress.splitting import interval, split
 
 
@@ -20,6 +22,57 @@ def test_the_mean_of_estimates_is_the_exact_probability(process, p):
     error = np.std(found, ddof=1) / math.sqrt(len(found))
     assert abs(np.mean(found) - exact) < 4.0 * error
     assert error < 0.4 * exact
+
+
+def guided_brownian(p, lead):
+    """Brownian motion that fails at b, with a guide that is broken at lead * b on every second step, or never on the way."""
+    from scipy.stats import norm
+
+    b, steps = norm.isf(p / 2), 100
+
+    def path(draw, n):
+        x = np.maximum.accumulate(np.cumsum(draw(NORMAL), axis=1) / math.sqrt(steps), axis=1)
+        x = np.concatenate([np.zeros((n, 1)), x], axis=1)
+        seen = np.maximum.accumulate(np.where(np.arange(steps + 1) % 2, x, 0.0), axis=1)
+        return guided(b - x, lead * b - seen)
+
+    return playing(path, steps)
+
+
+@pytest.mark.parametrize("lead", [0.5, 0.9, 3.0])
+def test_a_guide_changes_no_probability(lead):
+    """Be it broken long before a failure, just before, or after it."""
+    p, shift = 1e-3, 0.5826 / math.sqrt(100)  # of a walk in steps (Broadie et al. 1997)
+    from scipy.stats import norm
+
+    exact = 2.0 * norm.sf(norm.isf(p / 2) + shift)
+    found = [r.probability for r in split(guided_brownian(p, lead), 40, 10, 40, 1)]
+    error = np.std(found, ddof=1) / math.sqrt(len(found))
+    assert abs(np.mean(found) - exact) < 4.0 * error + 0.02 * exact
+    assert error < 0.4 * exact
+
+
+def test_a_guided_score_never_rises_and_is_negative_for_a_failure_alone():
+    known = np.array([np.inf, np.inf, 5.0, 5.0, 2.0, 0.0, -1.0])
+    guide = np.array([np.inf, 3.0, 3.0, 0.0, -0.5, -2.0, -2.0])
+    score = guided(known, guide)
+    assert (np.diff(score[1:]) <= 0.0).all()
+    np.testing.assert_allclose(score, [np.inf, 4.0, 4.0, 1.0, 2 / 3, 0.0, -1.0])
+    np.testing.assert_array_equal(guided(known, -np.ones(7))[[0, 6]], [1.0, -1.0])
+
+
+def test_a_repetition_whose_branches_are_all_alike_ends():
+    """A score that creeps on without end is no way to a failure."""
+    rounds = []
+
+    def play(games):
+        rounds.append(len(games))
+        scores = [1.0 - 1e-3 * (len(rounds) + i / len(games)) for i in range(len(games))]
+        return [Played(g, Verdict(s, [0], [s]), 1.0, 0.0, "") for g, s in zip(games, scores, strict=True)]
+
+    (found,) = split(play, 20, 5, 1, 1)
+    assert found.is_extinct
+    assert 20 < len(rounds) < 200
 
 
 @pytest.mark.slow

@@ -169,6 +169,29 @@ def test_what_has_no_answer_is_said_in_one_sentence():
         calm.probability(4, 2)
 
 
+def test_a_guide_finds_the_same_probability(found):
+    guide = "always (approach(left, right, 1 m/s) > 3 m)"
+    guided = study(guide=guide)
+    other = guided.probability(20, 6)
+    assert other.low < found[1].value < other.high
+    assert guided.info["guide"] == guide
+    assert guided.info["fingerprint"] != found[0].info["fingerprint"]
+    worst = other.failures[0]
+    assert worst.verdict.robustness == worst.verdict.score < 0.0
+    (again,) = GamePlayer(found[0].batch, found[0].watching, processes=1).play([worst.game])
+    assert again.verdict.robustness == worst.verdict.robustness
+    assert again.verdict.first_below(0.0) == worst.verdict.first_below(0.0)
+
+
+def test_a_guide_of_the_end_alone_or_of_a_search_is_of_no_use():
+    late = study(guide="lost[1] < 1").probability(4, 2)
+    assert "nothing is known of this specification before a game ends" in late.notes[0]
+    with pytest.raises(ParameterError, match="did you mean 'approach'"):
+        study(guide="always (aproach(left, right, 1 m/s) > 3 m)")
+    with pytest.raises(ParameterError, match="a guide is for"):
+        study(guide=TEXT, vary={"left.Hover.gain": (0.3, 1)}).search(10)
+
+
 def test_notes_say_where_the_result_is_weak():
     late = study("eventually[0,5] (distance(left, right) > 40 m)").probability(6, 2)
     assert (late.value, late.low, late.high) == (1.0, 1.0, 1.0)
