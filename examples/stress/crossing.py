@@ -12,9 +12,9 @@ class Beacon(Message):
     vel = Field("x y z", unit="m/s")
 
 
-def dot(a, b):
+def dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Products of vectors (3, n), (n,)."""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+    return np.asarray(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
 
 
 class VelocityObstacles(Autonomy):
