@@ -63,7 +63,9 @@ def test_the_commands_of_the_page_answer_with_small_numbers(tmp_path):
     assert re.search(r"probability of failure +0\.\d+ \(\S+–\S+\)", rare)
     assert re.search(r"failed +\d+ of 16 games; the same game of the other mission does not", searched)
     worst = re.search(r"tussle run (\S+failures/0.xml)", rare)[1]
-    assert re.search(r"hash +[0-9a-f]{32}", play(f"tussle run {worst} --plugin-path {PLUGIN}", tmp_path))
+    assert re.search(
+        r"hash +[0-9a-f]{32}", play(f"tussle run {worst} --plugin-path {shlex.quote(str(PLUGIN))}", tmp_path)
+    )
 
 
 def test_another_crossing_without_noise_has_nothing_rare(tmp_path):

@@ -22,7 +22,7 @@ quantities. What plugins report may differ between points."""
 MAX_METRICS = 10_000
 MAX_VALUE = 1e100
 """Largest metric that counts as finite: sums of squares of larger ones, as variances take them, are not."""
-MAX_NAME = 150
+MAX_NAME = 180
 """Characters of the name of a metric that a batch keeps; expressions with it may have a few more, see `quantities.MAX_TEXT`."""
 ALWAYS_ALLOWED = 1_000_000
 """Largest number of cells of a batch."""

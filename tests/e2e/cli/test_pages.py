@@ -127,7 +127,7 @@ def test_a_mission_page_has_blocks_plugins_and_the_step(tussle):
     for words in (
         "prey 1 4 Boids",
         "hunters 2 2 Predator(max_speed=35.0)",
-        "1 autonomy prey: Boids",
+        "2 autonomy prey: Boids",
         "grade: portable",
     ):
         assert any(line.split() == words.split() for line in text.splitlines()), words

@@ -8,6 +8,7 @@ from tussle.numeric.quaternion import quat_from_euler
 from tussle.plugins.stock.autonomy.predator import kernels
 
 N_WORLDS = 3
+DT = 0.1
 
 
 def game(n=60, seed=0, tied=False):
@@ -22,7 +23,7 @@ def game(n=60, seed=0, tied=False):
     return s, team, int(np.flatnonzero(s.group == 5)[0])
 
 
-def run(s, team, first, target, switching, capture_range=4.0, room=5000):
+def run(s, team, first, target, switching, capture_range=4.0, room=5000, vel=None):
     index = s.index(20.0)
     n = len(s.ids) - first
     row_of = {each: row for row, each in enumerate(zip(s.world.tolist(), s.ids.tolist(), strict=True))}
@@ -33,11 +34,15 @@ def run(s, team, first, target, switching, capture_range=4.0, room=5000):
     own = [axis[first:].copy() for axis in s.pos]
     n_claims = np.zeros(1, np.int64)
     fits = kernels.hunt(
-        (*own, np.full(n, capture_range)), (team[first:], np.ones(n, np.int64)), np.full(n, switching),
+        (*own, np.full(n, capture_range)),
+        (team[first:], np.ones(n, np.int64), np.full(n, switching), np.full(n, vel is not None)),
+        (np.zeros((3, len(s.ids))) if vel is None else vel, DT),
         (target, target_row, claim_row, claim_other, n_claims), (s.ids, s.world, index.place, index.order), first,
         (*index.table, index.gather(team.astype(float))),
     )  # fmt: skip
     assert fits == (n_claims[0] <= room)
+    if not fits:  # with the room that is asked for, or more, they fit
+        return run(s, team, first, target, switching, capture_range, int(n_claims[0]), vel)
     return target_row, n_claims[0], claim_row, claim_other, index
 
 
@@ -93,8 +98,28 @@ def test_claims_are_everyone_of_another_team_in_range(room):
         near = near[team[near] != team[first + i]]
         expected += [(i, j) for j in near[np.argsort(index.place[near])]]
     assert n_claims == len(expected) > 10
-    got = list(zip(claim_row, claim_other, strict=True))[: min(room, n_claims)]
-    assert got == expected[:room]
+    assert list(zip(claim_row, claim_other, strict=True))[:n_claims] == expected
+
+
+@pytest.mark.parametrize("speed", [1.0, 30.0])
+def test_between_steps_those_are_claimed_that_will_come_within_range(speed):
+    s, team, first = game(200)
+    vel = np.random.default_rng(1).normal(0.0, speed, (3, len(s.ids)))
+    target = np.zeros(len(s.ids) - first, np.int64)
+    _, n_claims, claim_row, claim_other, _ = run(s, team, first, target, True, vel=vel)
+    times = np.linspace(0.0, DT, 101)
+    certain, possible = set(), set()
+    for i in range(len(target)):
+        row = first + i
+        others = np.flatnonzero((s.world == s.world[row]) & (team != team[row]))
+        offset, closing = s.pos[:, others] - s.pos[:, [row]], vel[:, others] - vel[:, [row]]
+        least = np.min([np.linalg.norm(offset + t * closing, axis=0) for t in times], axis=0)
+        certain |= {(i, j) for j in others[least < 4.0]}
+        possible |= {(i, j) for j in others[least < 4.0 + 0.001 * speed]}
+    claimed = set(zip(claim_row[:n_claims].tolist(), claim_other[:n_claims].tolist(), strict=True))
+    assert len(claimed) == n_claims
+    assert certain <= claimed <= possible
+    assert len(certain) > 10
 
 
 def test_pursuit_points_at_the_target():

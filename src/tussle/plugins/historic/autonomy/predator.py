@@ -13,7 +13,7 @@ class Predator(predator.Predator):
     loop, and follows upside down, where the sign is right. It claims those that are within range at the start of the step only.
     """
 
-    between_steps = Param(False, doc="Claim entities, too, that come within capture_range during the step.")
+    between_steps = Param(False, doc="Claim those, too, who come within range during the step.")
 
     def step(self, g: GroupView) -> None:
         # Before the call too: without prey, the last command persists.

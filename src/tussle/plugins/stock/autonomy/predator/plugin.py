@@ -12,7 +12,7 @@ from tussle.plugins.stock.autonomy.predator import kernels
 class Predator(Autonomy):
     """Pursues the nearest prey (pure pursuit) and claims every entity of another team within `capture_range`.
 
-    It also claims those that come within that range during the step, if both move straight on: fast ones would pass each other unseen.
+    It also claims those that come within that range during the step if both move straight on.
     Without `allow_prey_switching` a target is kept until it is removed. Claims include rival predators, as in the paper's code.
     When no prey is left, the last commands persist. Without `pursue` it only claims, and another autonomy of the entity flies.
     """
@@ -24,7 +24,7 @@ class Predator(Autonomy):
     capture_range = Param(
         5.0, unit="m", ge=0.0, doc="Distance below which entities of other teams are claimed."
     )
-    between_steps = Param(True, doc="Claim entities, too, that come within capture_range during the step.")
+    between_steps = Param(True, doc="Claim those, too, who come within range during the step.")
     allow_prey_switching = Param(True, doc="Choose the nearest prey in every step.")
     prey_team_id = Param(1, doc="Team that is hunted.")
     pursue = Param(True, structural=True, doc="Write commands; otherwise only claim.")
