@@ -47,7 +47,7 @@ class Columnar(Device):
         tails = [
             array.shape[1:] if size else array.shape for array, size in zip(arrays, self._n_in, strict=True)
         ]
-        tail = np.broadcast_shapes(*tails)
+        tail = tails[0] if all(each == tails[0] for each in tails) else np.broadcast_shapes(*tails)
         columns = [column_major(array, size, tail) for array, size in zip(arrays, self._n_in, strict=True)]
         out = np.empty((max(self._n_out, 1), columns[0].shape[1]))
         self._columns(*columns, out)
@@ -57,7 +57,9 @@ class Columnar(Device):
 
 def column_major(array: Floats, size: int, tail: tuple[int, ...]) -> Floats:
     """Broadcast an array to its number of components and the common shape, as (components, n)."""
-    if size:
+    if array.shape == ((size, *tail) if size else tail):
+        shaped = array  # np.broadcast_to takes longer than the kernel
+    elif size:
         shaped = np.broadcast_to(
             array.reshape(size, *(1,) * (len(tail) - array.ndim + 1), *array.shape[1:]), (size, *tail)
         )

@@ -184,9 +184,8 @@ def columns(
     """Seeds, index and step as arrays of one length. Values out of range are refused: they would repeat another entity's draw."""
     words = np.asarray(seeds, dtype=np.uint64)
     indices, steps = np.asarray(index, dtype=np.int64), np.asarray(step, dtype=np.int64)
-    shape = np.broadcast_shapes((1,), words.shape, indices.shape, steps.shape)
     for name, values in (("index", indices), ("step", steps)):
-        if values.size and (values.min() < 0 or values.max() >= MAX_INDEX):
+        if values.view(np.uint64).max(initial=0) >= MAX_INDEX:  # negative numbers are large ones
             raise ValueError(
                 f"random numbers: {name} must be in 0 ... {MAX_INDEX - 1}, not {values.min()} ... {values.max()}"
             )
@@ -194,8 +193,13 @@ def columns(
         raise ValueError(f"random numbers: substep must be in 0 ... {MAX_SUBSTEP - 1}, not {substep}")
     if k < 0:
         raise ValueError(f"random numbers: k must not be negative, but is {k}")
-    return (
-        np.ascontiguousarray(np.broadcast_to(words, shape)),
-        np.ascontiguousarray(np.broadcast_to(indices, shape)),
-        np.ascontiguousarray(np.broadcast_to(steps, shape)),
-    )
+    if (
+        not words.shape == indices.shape == steps.shape or not words.ndim
+    ):  # np.broadcast_to takes longer than a draw
+        shape = np.broadcast_shapes((1,), words.shape, indices.shape, steps.shape)
+        words, indices, steps = (
+            np.broadcast_to(words, shape),
+            np.broadcast_to(indices, shape),
+            np.broadcast_to(steps, shape),
+        )
+    return np.ascontiguousarray(words), np.ascontiguousarray(indices), np.ascontiguousarray(steps)
