@@ -54,8 +54,13 @@ VEHICLES = {
 }
 
 
-def drive(scene, *vehicles, kind="SingleIntegrator", steps=60, substeps=1, seeds=1, threads=1, **block):
-    """Positions by step of vehicles, each a place and a velocity, (steps, 3, n); of the last world."""
+def drive(
+    scene, *vehicles, kind="SingleIntegrator", steps=60, substeps=1, seeds=1, threads=1, paces=1.0, **block
+):
+    """Positions by step of vehicles, each a place and a velocity, (steps, 3, n); of the last world.
+
+    `paces` multiply the velocities, by world.
+    """
     autonomy, motion = VEHICLES[kind]
     blocks = [
         Block(
@@ -69,7 +74,10 @@ def drive(scene, *vehicles, kind="SingleIntegrator", steps=60, substeps=1, seeds
     )  # fmt: skip
     sim, path = Simulation(game, seeds, threads=threads), []
     for i, (_, velocity) in enumerate(vehicles):
-        sim.write(f"a{i}.{autonomy.__name__}.to", velocity)
+        sim.write(
+            f"a{i}.{autonomy.__name__}.to",
+            np.multiply.outer(paces, [velocity]) if np.ndim(paces) else velocity,
+        )
     for _ in range(steps):
         sim.step()
         path.append(sim.state.population.bodies.pos[:, -len(vehicles) :].copy())
@@ -154,5 +162,11 @@ def test_the_same_alone_in_a_stack_and_in_threads():
     )
     crowd = [((x, y, 1.0), (u, v, 0.0)) for x, y, u, v in chance.uniform(-12, 12, (20, 4)) * [1, 1, 4, 4]]
     alone = drive(scene, *crowd, steps=30)
-    assert drive(scene, *crowd, steps=30, seeds=[5, 6, 1], threads=2).tobytes() == alone.tobytes()
+    for paces in (
+        1.0,
+        [50.0, 0.1, 1.0],
+        [0.01, 9.0, 1.0],
+    ):  # a faster world takes more pieces and more searches
+        stacked = drive(scene, *crowd, steps=30, seeds=[5, 6, 1], threads=2, paces=paces)
+        assert stacked.tobytes() == alone.tobytes()
     assert np.isfinite(alone).all()

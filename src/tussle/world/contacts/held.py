@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from tussle.world.contacts import found
+from tussle.world.contacts.boxes.kernels import CONTACT
 from tussle.world.contacts.solids import StaticSolids
 from tussle.world.contacts.ways.kernels import shorten
 
@@ -55,15 +56,29 @@ def held_ways(
     sizes = shapes[1]
     x, y, z = ways
     far = np.sqrt(x * x + y * y + z * z)
-    n_pieces = min(int(np.ceil((far / (PIECE * sizes[1])).max(initial=1.0))), MAX_PIECES)
+    n_pieces = np.ones(int(world.max(initial=-1)) + 1)
+    np.maximum.at(n_pieces, world, np.minimum(np.ceil(far / (PIECE * sizes[1])), MAX_PIECES))
     place, is_held = np.zeros((len(far), 3)), np.zeros(len(far), bool)
-    piece = ways.T / n_pieces
-    for _ in range(n_pieces):
-        made = _held_piece((shapes[0], sizes), pairs, piece, share, world, scene)
-        is_held |= (made != piece).any(axis=1)
-        place += made
-        shapes[0][:, :3] += made
+    piece = (ways / n_pieces[world]).T
+    for k in range(int(n_pieces.max(initial=0.0))):
+        rows = np.flatnonzero(n_pieces[world] > k)
+        bodies = *_of_rows(rows, shapes, pairs), piece[rows], share[rows], world[rows]
+        made = _held_piece(*bodies, scene)
+        is_held[rows] |= (made != piece[rows]).any(axis=1)
+        place[rows] += made
+        shapes[0][rows, :3] += made
     return np.where(is_held, place.T, ways)
+
+
+def _of_rows(
+    rows: np.ndarray, shapes: tuple[np.ndarray, np.ndarray], pairs: tuple[np.ndarray, np.ndarray]
+) -> tuple[tuple[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]:
+    """Items and sizes of all bodies of some worlds, at `rows`, (m,), and their pairs."""
+    (items, sizes), (row, other) = shapes, pairs
+    place = np.full(len(items), -1)
+    place[rows] = np.arange(len(rows))
+    kept = place[row] >= 0
+    return (items[rows], np.ascontiguousarray(sizes[:, rows])), (place[row[kept]], place[other[kept]])
 
 
 def _held_piece(
@@ -74,15 +89,27 @@ def _held_piece(
     world: np.ndarray,
     scene: StaticSolids,
 ) -> np.ndarray:
-    """Pieces of ways, (n, 3), that lead through nothing; see `held_ways`."""
+    """Pieces of ways, (n, 3), that lead through nothing; see `held_ways`. Only worlds with a way that is not free are searched again."""
     sizes, made, n_worlds = shapes[1], np.array(piece), int(world.max(initial=-1)) + 1
-    parts: list[found.ContactList] = []
+    rows = np.arange(len(piece))
+    row, other, numbers = np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros((0, CONTACT))
     for _ in range(MAX_SEARCHES):
-        parts.append(found.find(shapes, pairs, (np.ascontiguousarray(made.T), 1.0, world), scene, n_worlds))
-        row, other = (np.concatenate([getattr(part, name) for part in parts]) for name in ("row", "other"))
+        part = found.find(
+            *_of_rows(rows, shapes, pairs),
+            (np.ascontiguousarray(made[rows].T), 1.0, world[rows]),
+            scene,
+            n_worlds,
+        )
+        row = np.concatenate([row, rows[part.row]])
+        other = np.concatenate([other, np.where(part.other < 0, -1, rows[part.other])])
+        numbers = np.concatenate([numbers, part.numbers])
         smaller = np.where(other < 0, sizes[1, row], np.minimum(sizes[1, row], sizes[1, other]))
-        numbers = np.concatenate([part.numbers for part in parts])
-        if not shorten((row, other, numbers, KEPT_OVERLAP * smaller), share, PASSES, made) > 0.0:
+        is_blocked = np.zeros(len(piece), bool)
+        shorten((row, other, numbers, KEPT_OVERLAP * smaller), share, PASSES, made, is_blocked)
+        if not is_blocked.any():
             return made
-    made[(made != piece).any(axis=1)] = 0.0
+        goes_on = np.isin(world, world[is_blocked])
+        rows, kept = np.flatnonzero(goes_on), goes_on[row]
+        row, other, numbers = row[kept], other[kept], numbers[kept]
+    made[goes_on & (made != piece).any(axis=1)] = 0.0
     return made

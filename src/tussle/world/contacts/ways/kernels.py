@@ -9,8 +9,8 @@ ROUNDING = 1e-6
 """Part of the allowed overlap below which a way is not changed again, since it has been changed by that much too little."""
 
 
-@kernel("(I I F2 F) F i8 F2w -> f8")
-def shorten(contacts, share, passes, ways):
+@kernel("(I I F2 F) F i8 F2w Bw")
+def shorten(contacts, share, passes, ways, is_blocked):
     """Change ways so that no body enters another one by more than is allowed, along the normals of contacts: what is left slides.
 
     Args:
@@ -19,13 +19,10 @@ def shorten(contacts, share, passes, ways):
         share: Part of each body in a change, 0 for one whose way is kept, (n,).
         passes: Passes over all contacts.
         ways: Ways [m], (n, 3), written.
-
-    Returns:
-        Greatest change in the first pass [m]; 0 if all ways were free.
+        is_blocked: Set for bodies of contacts whose ways were not free, (n,).
     """
     row, other, numbers, allowed = contacts
-    greatest = 0.0
-    for p in range(passes):
+    for _ in range(passes):
         for k in range(row.shape[0]):
             a, b = row[k], other[k]
             normal = vector(numbers, k, 0)
@@ -37,10 +34,8 @@ def shorten(contacts, share, passes, ways):
             lack = min(0.0, -(numbers[k, 9] + allowed[k])) - along
             if not (lack > ROUNDING * allowed[k] and total > 0.0):
                 continue
-            if p == 0:
-                greatest = max(greatest, lack)
+            is_blocked[a] = True
             for i in range(3):
                 ways[a, i] += normal[i] * lack * share[a] / total
                 if b >= 0:
                     ways[b, i] -= normal[i] * lack * second / total
-    return greatest
