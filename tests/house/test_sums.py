@@ -1,4 +1,7 @@
-"""Python's `sum` of floats compensates for rounding since 3.12; what a game depends on is added by `tussle.numeric.total`."""
+"""What a game depends on is added by `tussle.numeric.total` and limited by `tussle.numeric.clip`.
+
+Python's `sum` of floats compensates for rounding since 3.12; zeros of `np.clip` have another sign in groups of one.
+"""
 
 import ast
 from pathlib import Path
@@ -30,3 +33,15 @@ def test_no_law_calls_the_sum_whose_rounding_depends_on_the_version_of_python() 
     ]
     found = {str(file.relative_to(ROOT)) for file in files if sums(file)}
     assert found == set(WHOLE), "take tussle.numeric.total"
+
+
+def test_no_plugin_calls_the_clip_whose_zeros_depend_on_the_number_of_entities() -> None:
+    package = ROOT / "src" / "tussle"
+    files = [file for place in ("api", "plugins") for file in (package / place).rglob("*.py")]
+    found = [
+        f"{file.relative_to(ROOT)}:{node.lineno}"
+        for file in files
+        for node in ast.walk(parsed(file))
+        if isinstance(node, ast.Attribute) and ast.unparse(node) == "np.clip" and file.parent.name != "plan"
+    ]
+    assert not found, "take tussle.numeric.clip"

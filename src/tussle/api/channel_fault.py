@@ -12,6 +12,7 @@ from tussle.api.group import GroupView
 from tussle.api.timed_fault import TimedFault
 from tussle.declare.columns import Param, State
 from tussle.errors import ParameterError, listed, nearest_name
+from tussle.numeric import clip
 
 FAULTS = "dropout", "bias", "freeze", "delay", "saturate", "reverse"
 MAX_DELAY = 1000
@@ -100,7 +101,7 @@ class ChannelFault(TimedFault):
         elif self.fault == "bias":
             wrong = true + self.value
         elif self.fault == "saturate":
-            wrong = np.clip(true, -np.abs(self.value), np.abs(self.value))
+            wrong = clip(true, -np.abs(self.value), np.abs(self.value))
         elif self.fault == "reverse":
             wrong = -true
         else:

@@ -3,6 +3,6 @@
 The functions take numbers in compiled code, and numbers or arrays (element-wise) in Python, with the same bits.
 """
 
-from tussle.numeric.functions import acos, asin, atan2, cos, exp, log, sin, sincos, tan, total, wrap
+from tussle.numeric.functions import acos, asin, atan2, clip, cos, exp, log, sin, sincos, tan, total, wrap
 
-__all__ = ["acos", "asin", "atan2", "cos", "exp", "log", "sin", "sincos", "tan", "total", "wrap"]
+__all__ = ["acos", "asin", "atan2", "clip", "cos", "exp", "log", "sin", "sincos", "tan", "total", "wrap"]

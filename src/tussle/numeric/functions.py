@@ -8,6 +8,7 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from tussle.numeric import elementary
 from tussle.numeric.kernel import Device, Kernel, kernel
@@ -32,6 +33,12 @@ def kernel_over_columns(scalar: Device, sizes: Sequence[int], n_out: int) -> Ker
     ]
     columns = define(lines, {"scalar": scalar}, scalar.__module__, f"{scalar.__qualname__}_columns")
     return kernel(" ".join([*["F2"] * len(sizes), "F2w"]))(columns)
+
+
+def clip(values: ArrayLike, low: ArrayLike, high: ArrayLike) -> NDArray[np.float64]:
+    """The nearest values within bounds, which broadcast. `np.clip` may return zeros of another sign for one entity than for several."""
+    raised = np.where(np.less(values, low), low, values)
+    return np.where(np.greater(raised, high), high, raised)
 
 
 class Elementwise(Device):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from tussle.numeric import clip
 from tussle.numeric.arrays import matmul, unit
 from tussle.numeric.segments import order_by_row
 
@@ -48,3 +49,12 @@ def test_items_are_ordered_by_row_and_keep_their_order_within_one():
     row = np.random.default_rng(1).integers(0, 50, 500)
     assert np.array_equal(order_by_row(row, 60), np.argsort(row, kind="stable"))
     assert len(order_by_row(row[:0], 0)) == 0
+
+
+@pytest.mark.parametrize("n", [1, 2, 9])
+def test_values_are_limited_with_the_same_signs_of_zeros_for_any_number_of_columns(n):
+    zeros, limit = np.full((3, n), -0.0), np.zeros(n)
+    assert np.signbit(clip(zeros, -limit, limit)).all()
+    values = np.array([[-3.0], [-0.0], [2.0], [np.nan], [np.inf]]) * np.ones(n)
+    np.testing.assert_array_equal(clip(values, -1.0, 1.5), np.clip(values, -1.0, 1.5))
+    assert clip(1.0, 5.0, 3.0) == np.clip(1.0, 5.0, 3.0) == 3.0

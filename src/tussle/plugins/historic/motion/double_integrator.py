@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from tussle.api import MotionBody
-from tussle.numeric import atan2
+from tussle.numeric import atan2, clip
 from tussle.plugins.historic.integration import advance_by, rk4_step, unrotated
 from tussle.plugins.stock.motion import double_integrator
 
@@ -31,7 +31,7 @@ class DoubleIntegrator(double_integrator.DoubleIntegrator):
         """Copy position, velocity within its limits, heading and yaw rate."""
         super().from_body(body, rows)
         limit = self.max_vel[rows]
-        self.x[3:6, rows] = np.clip(self.x[3:6, rows], -limit, limit)
+        self.x[3:6, rows] = clip(self.x[3:6, rows], -limit, limit)
 
     def to_body(self, body: MotionBody) -> None:
         """Write position, velocity and attitude."""
@@ -51,8 +51,8 @@ def _step(x: np.ndarray, u: dict[str, np.ndarray], p: dict[str, Any], h: float, 
     push = np.array([u["acceleration_x"], u["acceleration_y"], u["acceleration_z"]])
     size = np.sqrt(push[0] * push[0] + push[1] * push[1] + push[2] * push[2])
     push = np.where(size > p["max_acc"], push / np.where(size > 0.0, size, 1.0) * p["max_acc"], push)
-    most, turn = p["max_vel"], np.clip(u["turn_rate"], -p["max_yaw_acc"], p["max_yaw_acc"])
-    moved, turned = np.clip(x[3:6], -most, most), np.clip(turn, -p["max_yaw_vel"], p["max_yaw_vel"])
+    most, turn = p["max_vel"], clip(u["turn_rate"], -p["max_yaw_acc"], p["max_yaw_acc"])
+    moved, turned = clip(x[3:6], -most, most), clip(turn, -p["max_yaw_vel"], p["max_yaw_vel"])
 
     def f(s: np.ndarray) -> np.ndarray:
         is_limit = ((s[3:6] >= most) & (push > 0.0)) | ((s[3:6] <= -most) & (push < 0.0))

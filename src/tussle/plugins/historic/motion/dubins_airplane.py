@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from tussle.api import MotionBody, State
-from tussle.numeric import cos, sin, sincos, tan
+from tussle.numeric import clip, cos, sin, sincos, tan
 from tussle.numeric.paths import GRAVITY
 from tussle.plugins.historic.integration import advance_by, rk4_step
 from tussle.plugins.stock.motion import dubins_airplane
@@ -48,9 +48,9 @@ class DubinsAirplane(dubins_airplane.DubinsAirplane):
 
 
 def _step(x: np.ndarray, u: dict[str, np.ndarray], p: dict[str, Any], h: float) -> None:
-    speed = np.clip(u["desired_speed"], p["speed_min"], p["speed_max"])
-    dive = np.clip(u["desired_pitch"], p["pitch_min"], p["pitch_max"])
-    roll = np.clip(u["desired_roll"], p["roll_min"], p["roll_max"])
+    speed = clip(u["desired_speed"], p["speed_min"], p["speed_max"])
+    dive = clip(u["desired_pitch"], p["pitch_min"], p["pitch_max"])
+    roll = clip(u["desired_roll"], p["roll_min"], p["roll_max"])
     moves = np.abs(speed) >= STILL
     turn = np.where(moves, -GRAVITY / np.where(moves, speed, 1.0) * tan(roll), 0.0)
     sine, cosine = sincos(dive)

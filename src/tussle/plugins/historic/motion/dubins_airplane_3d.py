@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from tussle.api import MotionBody
-from tussle.numeric import tan
+from tussle.numeric import clip, tan
 from tussle.numeric.paths import GRAVITY
 from tussle.numeric.quaternion import quat_from_euler, quat_to_yaw
 from tussle.plugins.historic.integration import advance_by
@@ -48,7 +48,7 @@ class DubinsAirplane3D(dubins_airplane_3d.DubinsAirplane3D):
 
 
 def _step(x: np.ndarray, u: dict[str, np.ndarray], p: dict[str, Any], h: float) -> None:
-    speed, roll = np.clip(u["desired_speed"], p["speed_min"], p["speed_max"]), u["desired_roll"]
+    speed, roll = clip(u["desired_speed"], p["speed_min"], p["speed_max"]), u["desired_roll"]
     moves = np.abs(speed) >= STILL
     rate = np.where(moves, -GRAVITY / np.where(moves, speed, 1.0) * tan(roll), 0.0)
     x[3:7] = quat_from_euler(roll, u["desired_pitch"], quat_to_yaw(x[3:7]))

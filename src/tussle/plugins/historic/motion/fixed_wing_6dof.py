@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from tussle.numeric import atan2, sincos
+from tussle.numeric import atan2, clip, sincos
 from tussle.numeric.quaternion import quat_from_euler, quat_multiply
 from tussle.plugins.historic.integration import (
     advance_by,
@@ -106,16 +106,16 @@ def _loads(
     """Thrust and air force [N], and moment [N m], (3, n) each, in axes forward, right, down."""
     span, chord, area = p["wing_span"], p["chord_length"], p["surface_area_of_wing"]
     elevator, aileron, rudder = (
-        np.clip(u[name], p[f"delta_{name}_min"], p[f"delta_{name}_max"])
+        clip(u[name], p[f"delta_{name}_min"], p[f"delta_{name}_max"])
         for name in ("elevator", "aileron", "rudder")
     )
     low, high = p["throttle_input_min"], p["throttle_input_max"]
-    share = (np.clip(np.clip(u["throttle"], -1.0, 1.0), low, high) - low) / (high - low)
+    share = (clip(clip(u["throttle"], -1.0, 1.0), low, high) - low) / (high - low)
     thrust = p["thrust_min"] + share * (p["thrust_max"] - p["thrust_min"])
     air = velocity + unrotated(quat, FLIP * p["wind"])
     speed = np.sqrt((air * air).sum(axis=0))
     speed = np.where(speed < STILL, STILL, speed)
-    alpha, slip = atan2(air[2], air[0]), np.clip(air[1] / speed, -1.0, 1.0)
+    alpha, slip = atan2(air[2], air[0]), clip(air[1] / speed, -1.0, 1.0)
     beta = np.arcsin(slip)
     half_span, half_chord = 0.5 * span / speed, 0.5 * chord / speed
     lift, drag, side = p["lift"], p["drag"], p["side_force"]

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from tussle.numeric import clip
 from tussle.numeric.quaternion import quat_from_euler, quat_to_pitch, quat_to_roll, quat_to_yaw
 from tussle.plugins.stock.motion import jsbsim_model
 from tussle.plugins.stock.motion.jsbsim_model.flight import THROTTLES
@@ -96,7 +97,7 @@ class JSBSimControl(SphericalEarth, jsbsim_model.JSBSimControl):
 
     def commands(self, u: np.ndarray) -> np.ndarray:
         """Return the inputs, within their limits."""
-        return np.asarray(np.clip(u, -1.0, 1.0))
+        return np.asarray(clip(u, -1.0, 1.0))
 
 
 def _turned(angle: np.ndarray) -> np.ndarray:

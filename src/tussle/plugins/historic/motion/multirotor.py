@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from tussle.api import MotionBody, State
-from tussle.numeric import atan2, sincos
+from tussle.numeric import atan2, clip, sincos
 from tussle.plugins.historic.integration import (
     advance_by,
     multiplied,
@@ -65,7 +65,7 @@ def _step(x: np.ndarray, u: dict[str, np.ndarray], p: dict[str, Any], h: float, 
     quat, rates, own, mass = x[6:10], x[10:13], x[13:], p["mass"]
     lift, moment = 0.0 * mass, np.zeros((3, x.shape[1]))
     for i, (turning, along, left, *_) in enumerate(rotors):
-        speed = np.clip(u[f"motor_{i}"], p["omega_min"], p["omega_max"])
+        speed = clip(u[f"motor_{i}"], p["omega_min"], p["omega_max"])
         thrust = np.where(speed == p["omega_min"], 0.0, p["c_T"] * speed * speed)
         arm, (sine, cosine) = np.sqrt(along * along + left * left), sincos(atan2(left, along))
         lift = lift + thrust

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from tussle.api import MotionBody, State
+from tussle.numeric import clip
 from tussle.numeric.quaternion import quat_conjugate, quat_multiply
 from tussle.plugins.historic.integration import advance_by, normalized, quat_rates, rk4_step, rotated
 from tussle.plugins.stock.motion import rigid_body_6dof
@@ -51,8 +52,8 @@ class RigidBody6DOF(rigid_body_6dof.RigidBody6DOF):
 
 def _step(x: np.ndarray, u: dict[str, np.ndarray], p: dict[str, Any], h: float) -> None:
     start = x[10:]
-    x[3] = np.clip(x[3], p["min_velocity"], p["max_velocity"])
-    turn = np.clip(x[3], -MAX_TURN, MAX_TURN)
+    x[3] = clip(x[3], p["min_velocity"], p["max_velocity"])
+    turn = clip(x[3], -MAX_TURN, MAX_TURN)
     spin = np.array([u["aileron"], u["elevator"], u["rudder"]])
 
     def f(s: np.ndarray) -> np.ndarray:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from tussle.api import MotionBody
-from tussle.numeric import cos, sin, tan
+from tussle.numeric import clip, cos, sin, tan
 from tussle.numeric.quaternion import quat_from_euler
 from tussle.plugins.historic.integration import advance_by, rk4_step
 from tussle.plugins.stock.motion import simple_aircraft
@@ -44,9 +44,9 @@ class SimpleAircraft(simple_aircraft.SimpleAircraft):
 
 
 def _step(x: np.ndarray, u: dict[str, np.ndarray], p: dict[str, Any], h: float) -> None:
-    roll_rate = np.clip(u["roll_rate"], -p["max_roll_rate"], p["max_roll_rate"])
-    pitch_rate = np.clip(u["pitch_rate"], -p["max_pitch_rate"], p["max_pitch_rate"])
-    push = np.clip(u["throttle"], -100.0, 100.0) / 5.0
+    roll_rate = clip(u["roll_rate"], -p["max_roll_rate"], p["max_roll_rate"])
+    pitch_rate = clip(u["pitch_rate"], -p["max_pitch_rate"], p["max_pitch_rate"])
+    push = clip(u["throttle"], -100.0, 100.0) / 5.0
 
     def f(s: np.ndarray) -> np.ndarray:
         roll, pitch, yaw, speed = s[3:]
@@ -63,7 +63,7 @@ def _step(x: np.ndarray, u: dict[str, np.ndarray], p: dict[str, Any], h: float) 
             ]
         )
 
-    x[3] = np.clip(x[3], -p["max_roll"], p["max_roll"])
-    x[4] = np.clip(x[4], -p["max_pitch"], p["max_pitch"])
-    x[6] = np.clip(x[6], p["min_velocity"], p["max_velocity"])
+    x[3] = clip(x[3], -p["max_roll"], p["max_roll"])
+    x[4] = clip(x[4], -p["max_pitch"], p["max_pitch"])
+    x[6] = clip(x[6], p["min_velocity"], p["max_velocity"])
     x[:] = rk4_step(f, x, h)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from tussle.api import HistoricAttributes, MotionBody, Param, State
-from tussle.numeric import cos, sin, tan
+from tussle.numeric import clip, cos, sin, tan
 from tussle.plugins.historic.integration import advance_by, rk4_step
 from tussle.plugins.stock.motion import simple_car
 
@@ -58,8 +58,8 @@ class SimpleCar(simple_car.SimpleCar):
 
 
 def _step(x: np.ndarray, u: dict[str, np.ndarray], p: dict[str, Any], h: float, falls: bool) -> None:
-    speed = np.clip(u["speed"], 0.0, p["max_velocity"])
-    turn = speed / p["length"] * tan(np.clip(u["steering"], -STEERING_MAX, STEERING_MAX))
+    speed = clip(u["speed"], 0.0, p["max_velocity"])
+    turn = speed / p["length"] * tan(clip(u["steering"], -STEERING_MAX, STEERING_MAX))
     is_free = np.array([np.abs(u[name]) <= MIN_FORCE for name in ("force_x", "force_y", "force_z")])
     fall = -GRAVITY * p["mass"] if falls else 0.0 * speed
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from tussle.api import MotionBody, Param
+from tussle.numeric import clip
 from tussle.plugins.historic.integration import advance_by
 from tussle.plugins.historic.relative_attitude import LOADS, begin, publish, relative_state, turn
 from tussle.plugins.stock.motion import unicycle_3d
@@ -57,7 +58,7 @@ def _limited(u: dict[str, np.ndarray], p: dict[str, Any], name: str) -> np.ndarr
     """Return a command within its limits."""
     a, b = p[f"{name}_min"], p[f"{name}_max"]
     a = np.where(np.isinf(a), -b, a)
-    return np.asarray(np.clip(u[name], np.minimum(a, b), np.maximum(a, b)))
+    return np.asarray(clip(u[name], np.minimum(a, b), np.maximum(a, b)))
 
 
 def _step(x: np.ndarray, u: dict[str, np.ndarray], p: dict[str, Any], h: float, accel_max: float) -> None:

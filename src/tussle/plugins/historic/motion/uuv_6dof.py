@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from tussle.api import MotionBody, State
+from tussle.numeric import clip
 from tussle.plugins.historic.integration import (
     advance_by,
     normalized,
@@ -72,7 +73,7 @@ class UUV6DOF(uuv_6dof.UUV6DOF):
 
 
 def _step(x: np.ndarray, u: dict[str, np.ndarray], p: dict[str, Any], h: float) -> None:
-    power, planes, rudder = (np.clip(u[name], -1.0, 1.0) for name in ("throttle", "elevator", "rudder"))
+    power, planes, rudder = (clip(u[name], -1.0, 1.0) for name in ("throttle", "elevator", "rudder"))
     share = 0.5 * (power + 1.0)
     driven = THRUST[0] + share * (THRUST[1] - THRUST[0]), -PROPELLER_MOMENT * power
     weight, lift = p["mass"] * p["gravity_magnitude"], p["buoyancy"]

@@ -13,6 +13,7 @@ from tussle.api.channels import CHANNEL_UNITS
 from tussle.declare import texts
 from tussle.declare.messages import ChargeAdded, ChargePercentage
 from tussle.errors import ParameterError, listed, nearest_name
+from tussle.numeric import clip
 
 TYPES = ("NonZero", "Delta")
 DEPLETION = """[ desired_speed, 1.0, NonZero, true, 0.0 ]
@@ -109,7 +110,7 @@ class MotionBattery(Controller):
 
     def spawn(self, g: GroupView, rows: np.ndarray) -> None:
         """Charge the battery."""
-        self.charge[rows] = np.clip(self.charge_initial[rows], self.charge_min[rows], self.charge_max[rows])
+        self.charge[rows] = clip(self.charge_initial[rows], self.charge_min[rows], self.charge_max[rows])
 
     def step(self, g: GroupView) -> None:
         """Discharge the battery, and pass or limit the channels."""
@@ -127,7 +128,7 @@ class MotionBattery(Controller):
                 taken += each.rate * np.abs(value - last) * self.is_started
             last[:] = value
         self.is_started[:] = True
-        self.charge[:] = np.clip(self.charge - taken, self.charge_min, self.charge_max)
+        self.charge[:] = clip(self.charge - taken, self.charge_min, self.charge_max)
         is_empty = self.charge <= self.charge_min
         for each in used:
             value, out = getattr(self, f"{each.channel}_in")[0], getattr(self, f"{each.channel}_out")[0]

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from tussle.api import Controller, GroupView, Input, Output, Param, State, row_law
+from tussle.numeric import clip
 
 
 class UUV6DOFLinearEnergy(Controller):
@@ -29,7 +30,7 @@ class UUV6DOFLinearEnergy(Controller):
 
     def spawn(self, g: GroupView, rows: np.ndarray) -> None:
         """Charge the battery."""
-        self.energy[rows] = np.clip(self.energy_initial[rows], self.energy_min[rows], self.energy_max[rows])
+        self.energy[rows] = clip(self.energy_initial[rows], self.energy_min[rows], self.energy_max[rows])
 
     @row_law("passed", "energy")
     @staticmethod

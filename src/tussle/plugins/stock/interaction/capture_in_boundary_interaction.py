@@ -6,6 +6,7 @@ import numpy as np
 
 from tussle.api import Interaction, Param, State, WorldView
 from tussle.declare.messages import EntityCaptured
+from tussle.numeric import clip
 from tussle.numeric.ways import closest_approach
 from tussle.world.scene import Volume
 
@@ -72,7 +73,7 @@ class CaptureInBoundaryInteraction(Interaction):
         near = w.near(np.where(reach > 0.0, wide, 0.0), teams="other")
         row, other = near.row, near.other
         offset, way = (v[:, other] - v[:, row] for v in (w.pos, ways))
-        begin = np.clip(1.0 - (w.t[w.world[row]] - self.ready_at[row]) / w.dt, 0.0, 1.0)
+        begin = clip(1.0 - (w.t[w.world[row]] - self.ready_at[row]) / w.dt, 0.0, 1.0)
         distance = np.minimum(closest_approach(offset - way, way, begin)[1], near.distance)
         is_near = distance < reach[row]
         return row[is_near], other[is_near], distance[is_near]

@@ -8,6 +8,7 @@ from tussle.api import Interaction, Param, State, WorldView
 from tussle.declare import units
 from tussle.declare.messages import EntityHitGround
 from tussle.errors import ParameterError
+from tussle.numeric import clip
 from tussle.numeric.quaternion import quat_conjugate, quat_rotate
 
 LEVELLING = 4.0
@@ -128,7 +129,7 @@ class GroundCollision(Ground):
         gravity = weight / mass
         else_ = (vel - self.before[:3, rows]) / dt - self.before[3:, rows] / mass
         else_[2] += gravity
-        else_ = np.where(self.known[rows], np.clip(else_, -2.0 * gravity, 2.0 * gravity), 0.0)
+        else_ = np.where(self.known[rows], clip(else_, -2.0 * gravity, 2.0 * gravity), 0.0)
         # With this speed at the end of the step, the next one ends on the ground with speed 0. What is below rises slowly.
         wanted = np.where(height >= 0.0, np.minimum(0.0, -height / dt - 0.5 * vel[2]), -0.2 * height / dt)
         normal = np.maximum(0.0, mass * ((wanted - vel[2]) / dt - else_[2]) + weight)

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from tussle.api import GroupView, HistoricAttributes, Output, Param, Sensor
-from tussle.numeric import tan
+from tussle.numeric import clip, tan
 from tussle.numeric.quaternion import quat_from_euler, quat_multiply, quat_rotate_inverse
 
 PAIR = "mean sd"
@@ -136,7 +136,7 @@ def _extent(
     # Tangent of the sphere's half angle. A camera inside the sphere sees it in all directions.
     tangent = radius / np.sqrt(np.maximum(square, 1e-12))
     low, high = (_turned(slope, sign * tangent, sign * np.inf) for sign in (-1.0, 1.0))
-    low, high = (0.5 * size * (1.0 + np.clip(edge / half, -1.0, 1.0)) for edge in (low, high))
+    low, high = (0.5 * size * (1.0 + clip(edge / half, -1.0, 1.0)) for edge in (low, high))
     (mean, sd), (mean_size, sd_size) = errors
     center = 0.5 * (low + high) + mean + sd * draws[0]
     return center, np.maximum(0.0, high - low + mean_size + sd_size * draws[1])

@@ -6,7 +6,7 @@ import numpy as np
 
 from tussle.api import Autonomy, GroupView, Input, Output, Param, Publish, State
 from tussle.declare.messages import GoalReached
-from tussle.numeric import atan2, cos, sin
+from tussle.numeric import atan2, clip, cos, sin
 from tussle.numeric.quaternion import quat_rotate
 from tussle.numeric.ways import closest_approach
 from tussle.plugins.stock.autonomy.go_to_by_lidar import kernels
@@ -91,6 +91,6 @@ class GoToByLidar(Autonomy):
         stopping = a * (np.sqrt(t * t + 2.0 * np.minimum(free, distance) / a) - t)
         speed = np.minimum(self.speed, stopping)
         self.velocity[0], self.velocity[1] = speed * cos(self.heading), speed * sin(self.heading)
-        self.velocity[2] = np.clip(self.target[2] - g.pos[2], -0.2 * self.speed, 0.2 * self.speed)
+        self.velocity[2] = clip(self.target[2] - g.pos[2], -0.2 * self.speed, 0.2 * self.speed)
         self.desired_heading[:], self.desired_altitude[:] = self.heading, self.target[2]
         self.desired_speed[:] = speed

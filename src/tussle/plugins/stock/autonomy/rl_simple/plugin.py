@@ -14,6 +14,7 @@ import numpy as np
 from tussle.api import Autonomy, GroupView, Handle, HistoricAttributes, Input, Output, Param, Publish
 from tussle.declare.messages import RewardGiven
 from tussle.errors import ParameterError, clipped
+from tussle.numeric import clip
 from tussle.plugins.stock.autonomy.rl_simple.actors import Alternating, spaces_of
 from tussle.plugins.stock.autonomy.rl_simple.remote import ActorServer, RemoteActor
 
@@ -177,7 +178,7 @@ class RLSimple(Autonomy):
         velocity = [0.0, 0.0, 0.0]
         for i, number in zip(order, numbers, strict=True):
             velocity[i] = (
-                (1.0 if number > 0 else -1.0) if is_discrete[i] else float(np.clip(number, -limit, limit))
+                (1.0 if number > 0 else -1.0) if is_discrete[i] else float(clip(number, -limit, limit))
             )
         return velocity[0], velocity[1], velocity[2]
 

@@ -13,6 +13,7 @@ import numpy as np
 from tussle.api import Handle, HistoricAttributes, Input, MotionBody, Param, RigidBodyModel
 from tussle.declare import units
 from tussle.errors import MissingFileError, ParameterError, SnapshotError, listed, nearest_name
+from tussle.numeric import clip
 from tussle.numeric.quaternion import (
     quat_conjugate,
     quat_multiply,
@@ -362,7 +363,7 @@ class JSBSimControl(JSBSimAircraft):
 
     def commands(self, u: np.ndarray) -> np.ndarray:
         """Return the inputs, within their limits."""
-        return np.stack([np.clip(u[0], 0.0, 1.0), *np.clip(u[1:], -1.0, 1.0)])
+        return np.stack([clip(u[0], 0.0, 1.0), *clip(u[1:], -1.0, 1.0)])
 
 
 class JSBSimModel(JSBSimAircraft):

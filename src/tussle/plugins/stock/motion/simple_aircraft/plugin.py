@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from tussle.api import Input, MotionBody, MotionModel, Param, State, row_law
+from tussle.numeric import clip
 from tussle.plugins.stock.motion.simple_aircraft import kernels
 
 
@@ -60,10 +61,10 @@ class SimpleAircraft(MotionModel):
         speed = np.sqrt(vx * vx + vy * vy + vz * vz)
         x = self.x
         x[:3, rows] = body.pos[:, rows]
-        x[3, rows] = np.clip(-body.column("roll", rows), -self.max_roll[rows], self.max_roll[rows])
-        x[4, rows] = np.clip(body.column("climb", rows), -self.max_pitch[rows], self.max_pitch[rows])
+        x[3, rows] = clip(-body.column("roll", rows), -self.max_roll[rows], self.max_roll[rows])
+        x[4, rows] = clip(body.column("climb", rows), -self.max_pitch[rows], self.max_pitch[rows])
         x[5, rows] = body.column("yaw", rows)
-        x[6, rows] = np.clip(speed, self.min_velocity[rows], self.max_velocity[rows])
+        x[6, rows] = clip(speed, self.min_velocity[rows], self.max_velocity[rows])
 
     def to_body(self, body: MotionBody) -> None:
         """Write position, attitude, velocity and angular velocity."""

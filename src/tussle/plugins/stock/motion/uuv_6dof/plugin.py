@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-
 from tussle.api import InertiaParam, Input, MassProperties, MotionBody, Param, PositiveParam, RigidBodyModel
+from tussle.numeric import clip
 from tussle.numeric.rigid_body import add, cross, scale, state_rates, to_body, to_world
 from tussle.plugins.stock.motion.uuv_6dof import kernels
 
@@ -106,5 +105,5 @@ class UUV6DOF(RigidBodyModel):
     def mass_properties(self, body: MotionBody) -> MassProperties:
         """Mass, inertia, and the weight in water: less the buoyancy, as in `derivative`."""
         found = super().mass_properties(body)
-        wet = np.clip(0.5 + (self.surface_height - body.pos[2]) / DIAMETER, 0.0, 1.0)
+        wet = clip(0.5 + (self.surface_height - body.pos[2]) / DIAMETER, 0.0, 1.0)
         return found._replace(weight=found.weight - wet * self.buoyancy)
