@@ -56,8 +56,9 @@ def shown(browser: Browser, page: Page, size: dict[str, int] = SIZE) -> Iterator
         watched.close()
 
 
-def chase(browser: Browser) -> None:
-    """Predators in the flock, live."""
+@contextmanager
+def hunted(browser: Browser) -> Iterator[Watched]:
+    """The live page of a game in which predators are in the flock."""
     loaded = read_mission(GAME)
     with (
         Simulation(loaded.mission, 1) as simulation,
@@ -66,6 +67,12 @@ def chase(browser: Browser) -> None:
     ):
         live.step(600)
         watched.wait("player.frame === 600")
+        yield watched
+
+
+def chase(browser: Browser) -> None:
+    """Predators in the flock, live."""
+    with hunted(browser) as watched:
         watched.press("ArrowRight")
         watched.press("o")
         watched.wait("player.status.entity")
@@ -74,14 +81,7 @@ def chase(browser: Browser) -> None:
 
 def plain(browser: Browser) -> None:
     """The same moment as a plain map."""
-    loaded = read_mission(GAME)
-    with (
-        Simulation(loaded.mission, 1) as simulation,
-        Live(simulation, is_paused=True, viewer=loaded.viewer) as live,
-        shown(browser, Page(live)) as watched,
-    ):
-        live.step(600)
-        watched.wait("player.frame === 600")
+    with hunted(browser) as watched:
         watched.press("2")
         watched.wait("player.isPlain")
         shoot(watched, "view-plain")

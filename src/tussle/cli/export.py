@@ -167,7 +167,7 @@ class _Exporter:
                 _report(file, f"{rows:,} {what}")
 
     def write_html(self, files: Mapping[str, Path]) -> None:
-        from tussle.cli.view import tell_of
+        from tussle.cli.view import annotate
         from tussle.view.export.html import write_html
         from tussle.view.page.compare import Comparison
 
@@ -175,7 +175,7 @@ class _Exporter:
         options, runs = self._options, [copy(self.recording)]
         if options.other is not None:
             runs.append(Recording(options.other, options.world or 0, tuple(options.plugin_files)))
-        tell_of(runs, options)
+        annotate(runs, options)
         game = Comparison(*runs, is_over_each_other=options.over) if len(runs) == 2 else runs[0]
         report = write_html(game, files["html"], period=options.period)
         _report(report.path, f"{report.n_frames:,} states of {report.n_entities:,} entities")

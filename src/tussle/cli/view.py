@@ -145,7 +145,7 @@ def replay(options: ReplayOptions) -> int:
         for path in (options.run, options.other)
         if path is not None
     ]
-    tell_of(runs, options)
+    annotate(runs, options)
     game = Comparison(*runs, is_over_each_other=options.over) if len(runs) == 2 else runs[0]
     with ExitStack() as stack:
         interrupt = stack.enter_context(Interrupt())
@@ -156,7 +156,7 @@ def replay(options: ReplayOptions) -> int:
         return watch(page, interrupt, lambda: False)
 
 
-def tell_of(runs: Sequence[Recording], options: RecordedAlarmOptions) -> None:
+def annotate(runs: Sequence[Recording], options: RecordedAlarmOptions) -> None:
     """Show specifications of recorded games, and marks on the time line of the first.
 
     Raises:

@@ -423,7 +423,7 @@ class Recording:
             self.notes.append(
                 f"{self.path.resolve().name} has states up to {stride * self.dt:g} s apart; specifications do not know what was between"
             )
-        self._tell(self.alarms.events)
+        self._add_events(self.alarms.events)
 
     def mark(self, t: float, text: str) -> None:
         """Mark a moment on the time line of pages.
@@ -432,9 +432,9 @@ class Recording:
             t: Its time [s].
             text: What there is to say about it.
         """
-        self._tell([Event(t, "mark", 0, 0, text)])
+        self._add_events([Event(t, "mark", 0, 0, text)])
 
-    def _tell(self, events: Iterable[Event]) -> None:
+    def _add_events(self, events: Iterable[Event]) -> None:
         self.events = sorted([*self.events, *events], key=lambda event: event.t)
 
     def time_of(self, step: int) -> float:

@@ -101,11 +101,11 @@ class Escort(Autonomy):
             x, y, z = messages.pos - g.pos[:, rows]
             first = first_of(rows, x * x + y * y + z * z)
             goal[:, rows[first]], has_goal[rows[first]] = messages.pos[:, first], True
-        rows, others = seen(g, self.intruder_team, self.sight)
-        goal[:, rows], has_goal[rows] = g.bodies.pos[:, others], True
-        self.goals.publish(np.flatnonzero(has_goal), pos=goal[:, has_goal])
         nearest = g.nearest(teams=self.intruder_team)
         others = nearest.other[0]
+        rows = np.flatnonzero((others >= 0) & (nearest.distance[0] <= self.sight))
+        goal[:, rows], has_goal[rows] = g.bodies.pos[:, others[rows]], True
+        self.goals.publish(np.flatnonzero(has_goal), pos=goal[:, has_goal])
         _, least = closest_approach(nearest.offset[:, 0], g.dt * (g.bodies.vel[:, others] - g.vel))
         rows = np.flatnonzero((others >= 0) & (least <= self.capture_range))
         self.captures.publish(rows, target=g.bodies.id[others[rows]])
