@@ -112,7 +112,7 @@ def roscore(tmp_path_factory):
 @pytest.fixture(scope="session")
 def ros_domain():
     """Number of a domain of ROS 2 that no other tests on this machine use; without Cyclone DDS, the test is skipped."""
-    pytest.importorskip("cyclonedds")
+    needs.require("cyclonedds")
     for domain in range(1, 101):  # the ports of higher ones are given to clients
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as claim:
             try:

@@ -1,4 +1,4 @@
-"""What tests need that `pip install '.[test]'` does not bring: whether it is there, and what to type to get it.
+"""What tests need that `pip install '.[test]'` does not bring, or not for each Python: whether it is there, and what to type to get it.
 
 Without it a test is skipped, and what pytest prints at its end says so. Where the variable TUSSLE_TEST_ALL is set, as .ci/run does when it
 has installed everything, the test fails instead. `python tests/needs.py` prints the packages of Debian that bring what can be had so.
@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import shutil
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.util import find_spec
@@ -99,9 +100,20 @@ def _has_renderer() -> bool:
     return True
 
 
+def package(name: str, module: str, until: int) -> Need:
+    """A package that `.[test]` brings for Python 3.(until - 1) and older: there is none for newer versions."""
+    return Need(
+        f"{name}, which is packaged for Python 3.{until - 1} and older",
+        _has_module(module),
+        command="pip install '.[test]'",
+        is_optional=sys.version_info >= (3, until),
+    )
+
+
 NEEDS = {
     "axe": Need("axe-core", lambda: axe() is not None, command="npm install", is_optional=True),
     "browser": Need("a browser", _has_program(*BROWSERS), "chromium fonts-dejavu-core"),
+    "cyclonedds": package("Cyclone DDS", "cyclonedds", 14),
     "fastdds": Need("Fast DDS", _has_headers(FASTDDS), "g++ libfastrtps-dev libfastcdr-dev"),
     "g++": Need("a compiler of C++", _has_program("g++"), "g++"),
     "mkdocs": Need("MkDocs", _has_module("mkdocstrings_handlers"), command="pip install '.[docs]'"),
@@ -112,6 +124,7 @@ NEEDS = {
         is_optional=True,
     ),
     "node": Need("Node.js", _has_program("node"), "nodejs npm"),
+    "ompl": package("OMPL", "ompl", 14),
     "opendis": Need("opendis", _has_module("opendis"), command="pip install --no-deps opendis"),
     "renderer": Need("OSMesa or EGL", _has_renderer, "libosmesa6"),
     "rosbag": Need("rosbag", _has_program("rosbag"), "python3-rosbag"),
@@ -124,12 +137,14 @@ NEEDS = {
     "rosnode": Need("rosnode", _has_program("rosnode"), "python3-rosnode python3-rosservice"),
     "rospy": Need("ROS 1", _has_rospy, ROSPY),
     "rostopic": Need("rostopic", _has_program("rostopic"), "python3-rostopic"),
+    "rtamt": package("rtamt", "rtamt", 13),
     "stable_baselines3": Need(
         "stable-baselines3",
         _has_module("stable_baselines3"),
         command="pip install stable-baselines3",
         is_optional=True,
     ),
+    "supersuit": package("SuperSuit", "supersuit", 13),
     "torch": Need("PyTorch", _has_module("torch"), command="pip install '.[train]'", is_optional=True),
     "tsc": Need("TypeScript", _has_program("tsc"), command="npm install", is_optional=True),
 }

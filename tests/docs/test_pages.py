@@ -2,6 +2,7 @@
 
 import re
 
+import needs
 import pytest
 from pages import FENCE, PAGES, ROOT, examples, namespace, run
 
@@ -9,12 +10,16 @@ IDS = [page.name for page in PAGES]
 SLOW = ("cluster.md", "optimize.md", "six-degrees.md")
 """Pages that start a cluster, search, or compile a whole aircraft."""
 
+NEEDED = {"planning.md": "ompl"}
+
 
 @pytest.mark.parametrize(
     "page",
     [pytest.param(page, marks=pytest.mark.slow if page.name in SLOW else (), id=page.name) for page in PAGES],
 )
 def test_the_code_of_a_page_runs_and_prints_what_it_shows(page):
+    if page.name in NEEDED:
+        needs.require(NEEDED[page.name])
     module = namespace(page)
     for example in examples(page):
         printed = run(example, page, module)

@@ -155,6 +155,7 @@ def test_planners_of_ompl_do_not_jump_over_a_wall():
     assert calls.is_valid(after)
 
 
+@pytest.mark.needs("ompl")
 @pytest.mark.parametrize("planner", ["RRT", "KPIECE1", "EST"])
 def test_planners_of_ompl_propagate_with_the_motion_model(planner):
     open_field = problem(scene=Scene(), goal=(40.0, 20.0, 0.0), goal_radius=8.0)
@@ -222,7 +223,10 @@ def test_goals_of_which_a_part_can_be_reached_are_planned_to():
         check(plan)
 
 
-@pytest.mark.parametrize("planner", [solve, lambda asked: solve_with_ompl(asked, "EST")])
+@pytest.mark.parametrize(
+    "planner",
+    [solve, pytest.param(lambda asked: solve_with_ompl(asked, "EST"), marks=pytest.mark.needs("ompl"))],
+)
 def test_a_start_in_the_goal_is_an_empty_plan(planner):
     plan = planner(problem(start={"x": 88.0, "y": 11.0}))
     assert plan.is_solved
@@ -232,6 +236,7 @@ def test_a_start_in_the_goal_is_an_empty_plan(planner):
     assert plan.distance_left == pytest.approx(math.hypot(2.0, 1.0))
 
 
+@pytest.mark.needs("ompl")
 def test_a_search_without_time_tells_how_far_it_came():
     plan = solve_with_ompl(problem(), "RRT", seconds=0.01)
     assert not plan.is_solved

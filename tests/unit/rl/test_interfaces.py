@@ -5,6 +5,7 @@ import warnings
 from dataclasses import replace
 
 import gymnasium
+import needs
 import numpy as np
 import pytest
 from flee import Flee
@@ -93,7 +94,8 @@ def test_actions_that_do_not_fit_are_refused(task):
 
 
 def test_supersuit_makes_a_vector_environment(task):
-    supersuit = pytest.importorskip("supersuit")
+    needs.require("supersuit")
+    supersuit = pytest.importorskip("supersuit")  # warnings of its modules are none of the test
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         env = supersuit.black_death_v3(parallel_env(task))

@@ -6,7 +6,7 @@ import warnings
 
 import numpy as np
 import pytest
-from needs import NEEDS
+from needs import NEEDS, require
 
 from tussle.rl import (
     NearOrigin,
@@ -72,7 +72,8 @@ def test_ppo_of_stable_baselines3_learns_in_a_task():
 def test_ppo_of_stable_baselines3_plays_all_agents_through_supersuit(task):
     """The lines of docs/learning.md."""
     baselines = pytest.importorskip("stable_baselines3", reason=NEEDS["stable_baselines3"].reason)
-    supersuit = pytest.importorskip("supersuit")
+    require("supersuit")
+    supersuit = pytest.importorskip("supersuit")  # warnings of its modules are none of the test
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of SuperSuit itself
         env = supersuit.black_death_v3(parallel_env(task))

@@ -34,13 +34,13 @@ def solve_with_ompl(problem: Problem, planner: str = "RRT", *, seed: int = 1, se
         MissingExtraError: OMPL is not installed.
         ParameterError: There is no such planner.
     """
+    check_argument("planner", planner, PLANNERS)
+    check_argument("seed", seed, Whole(1, 2**32 - 1))
+    check_argument("seconds", seconds, Real(0.0))
     try:
         from ompl import base, control, util
     except ImportError:
         raise MissingExtraError("solve_with_ompl needs OMPL: pip install 'tussle[plan]'") from None
-    check_argument("planner", planner, PLANNERS)
-    check_argument("seed", seed, Whole(1, 2**32 - 1))
-    check_argument("seconds", seconds, Real(0.0))
     if problem.is_at_goal:
         return problem.empty_plan()
     util.setLogLevel(util.LogLevel.LOG_NONE)
