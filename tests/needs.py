@@ -146,6 +146,7 @@ NEEDS = {
     ),
     "supersuit": package("SuperSuit", "supersuit", 13),
     "torch": Need("PyTorch", _has_module("torch"), command="pip install '.[train]'", is_optional=True),
+    "vmas": Need("VMAS", _has_module("vmas"), command="pip install vmas", is_optional=True),
     "tsc": Need("TypeScript", _has_program("tsc"), command="npm install", is_optional=True),
 }
 

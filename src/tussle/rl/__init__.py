@@ -16,7 +16,7 @@ from tussle.rl.environments import TaskEnv, TaskVectorEnv, make, make_vec, regis
 from tussle.rl.games import Consensus, NearOrigin, PredatorPrey, PredatorsAndPrey, PredatorTeam, PreyEscape
 from tussle.rl.observation import Component, Each, Means, NearestOthers, Own, Sectors
 from tussle.rl.parallel import TaskParallelEnv, parallel_env
-from tussle.rl.particles import SimpleAdversary, SimpleSpread, SimpleTag
+from tussle.rl.particles import Dispersion, SimpleAdversary, SimpleSpread, SimpleTag
 from tussle.rl.policy_file import write_policy
 from tussle.rl.reward import FoundOthers, Situation, Term, alive, captured, captures, collisions, died
 from tussle.rl.robots import Coverage, FindWay, Formation, Hover, ReachPoint
@@ -35,6 +35,7 @@ __all__ = [
     "Consensus",
     "Coverage",
     "Dispersal",
+    "Dispersion",
     "Each",
     "FindWay",
     "Formation",
@@ -90,6 +91,7 @@ for _task in (
     CaptureTheFlagRed,
     Coverage,
     Dispersal,
+    Dispersion,
     FindWay,
     Formation,
     Hover,

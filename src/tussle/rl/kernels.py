@@ -498,3 +498,13 @@ def slide(x, u, p, dt, substeps):
             if speed > p[0, i]:
                 vx, vy = vx / speed * p[0, i], vy / speed * p[0, i]
             x[2, i], x[3, i] = vx, vy
+
+
+@kernel("F2w F2 F2 f8 i8")
+def glide(x, u, p, dt, substeps):
+    """Velocities are damped and pushed [N] at mass 1; positions advance by the new ones, and stay within p [m] of the centre."""
+    for _ in range(substeps):
+        for i in range(x.shape[1]):
+            for c in range(2):
+                x[2 + c, i] = x[2 + c, i] * (1.0 - DAMPING) + u[c, i] * dt
+                x[c, i] = min(max(x[c, i] + x[2 + c, i] * dt, -p[0, i]), p[0, i])

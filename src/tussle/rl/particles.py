@@ -1,7 +1,7 @@
-"""Games of particles in a plane: tag, cooperative navigation and physical deception (Lowe and others 2017, Mordatch and Abbeel 2018).
+"""Games of particles in a plane: tag, cooperative navigation, physical deception and dispersion.
 
-They have the laws of motion, observations, actions and rewards of simple_tag, simple_spread and simple_adversary in MPE2: with the same
-first positions and actions, the trajectories agree to 1e-9.
+They have the laws of motion, observations, actions and rewards of simple_tag, simple_spread and simple_adversary in MPE2 (Lowe and others
+2017, Mordatch and Abbeel 2018), and of dispersion in VMAS: with the same first positions and actions, trajectories agree to 1e-9.
 """
 
 from __future__ import annotations
@@ -10,13 +10,23 @@ from typing import Any
 
 import numpy as np
 
-from tussle.api import Autonomy, Controller, Input, Interaction, MotionModel, Output, Param, State
+from tussle.api import (
+    Autonomy,
+    Controller,
+    EasyAutonomy,
+    Input,
+    Interaction,
+    MotionModel,
+    Output,
+    Param,
+    State,
+)
 from tussle.mission import Block, Mission
 from tussle.plugins.stock import Still
 from tussle.rl.action import Act
 from tussle.rl.computed import Computed
 from tussle.rl.draws import uniform
-from tussle.rl.kernels import slide, total_force
+from tussle.rl.kernels import glide, slide, total_force
 from tussle.rl.observation import Each, Own
 from tussle.rl.reward import Situation, Term
 from tussle.rl.task import Task
@@ -110,10 +120,15 @@ REACH = 0.05
 """Radius of the chased agent of tag [m]."""
 
 
+def spans(agents: np.ndarray, food: np.ndarray) -> np.ndarray:
+    """Distances of positions (W, A, 2) and (W, n, 2) [m], (W, A, n)."""
+    offset = agents[:, :, None] - food[:, None]
+    return np.asarray(np.sqrt((offset * offset).sum(axis=-1)))
+
+
 def distances(now: Situation, of: str) -> np.ndarray:
     """Distance of each agent to each entity of a block [m], (W, A, n)."""
-    offset = now.pos[:, :, None, :2] - now.simulation.read(f"{of}.pos")[0][:, None, :, :2]
-    return np.asarray(np.sqrt((offset * offset).sum(axis=-1)))
+    return spans(now.pos[..., :2], now.simulation.read(f"{of}.pos")[0][..., :2])
 
 
 def caught(now: Situation) -> np.ndarray:
@@ -244,4 +259,83 @@ class SimpleAdversary(Task):
     reward = {"deceived": Term(deceived)}  # noqa: RUF012
 
 
-__all__ = ["Particle", "ParticleContact", "SimpleAdversary", "SimpleSpread", "SimpleTag"]
+class WalledParticle(MotionModel):
+    """A particle of mass 1 in a square, which loses a quarter of its velocity per step, and advances by the new velocity."""
+
+    half_width = Param(1.0, unit="m", gt=0.0, doc="Half of the side of the square.")
+    x = State("x y vx vy", unit="m m m/s m/s")
+    push_x = Input(unit="N")
+    push_y = Input(unit="N")
+    advance = glide
+    from_body, to_body = Particle.from_body, Particle.to_body
+
+
+class PushToOwn(EasyAutonomy):
+    """Pushes the k-th particle of a block to the k-th landmark, whose ids follow: the rule of dispersion."""
+
+    n = Param(4, gt=0, doc="Number of particles.")
+    push_x = Output()
+    push_y = Output()
+
+    def step_one(self, me: Any) -> None:
+        offset = me.entity(me.id + self.n).pos - me.pos
+        me.push_x, me.push_y = (min(max(10.0 * value, -1.0), 1.0) for value in offset[:2])
+
+
+EATING = 0.085
+"""Distance below which a particle reaches food: their radii [m]."""
+
+
+class Meals(Interaction):
+    """Food of which each piece is eaten, once, by the agents that reach it first; they share it."""
+
+    share = State("a b c d", per="world", doc="Part of each piece for each who eats it in this step.")
+    eaten = State("a b c d", dtype=bool, per="world", doc="Which pieces have been eaten.")
+
+    def step(self, w: Any) -> None:
+        agents, food = (np.flatnonzero(w.team == team) for team in (AGENTS, LANDMARKS))
+        worlds = w.world[food].reshape(-1, 4)[:, 0]
+        places = [w.pos[:2, rows].T.reshape(len(worlds), 4, 2) for rows in (agents, food)]
+        n = (spans(*places) < EATING).sum(axis=1).T
+        is_new = (n > 0) & ~self.eaten[:, worlds]
+        self.share[:, worlds] = is_new / np.maximum(n, 1)
+        self.eaten[:, worlds] |= is_new
+
+
+def meals(now: Situation) -> np.ndarray:
+    """Food that each agent has eaten in this step, (W, A)."""
+    share, _ = now.simulation.read("Meals.share")
+    return np.asarray(((distances(now, "food") < EATING) * share[:, None]).sum(axis=-1))
+
+
+def food(simulation: Any) -> np.ndarray:
+    """Offset of each piece of food [m], and whether it has been eaten, (W, A, 12)."""
+    pos, there = (simulation.read(f"{name}.pos")[0][..., :2] for name in ("agent", "food"))
+    eaten = np.broadcast_to(simulation.read("Meals.eaten")[0][:, None, :, None], (len(pos), 4, 4, 1))
+    return np.concatenate([there[:, None] - pos[:, :, None], eaten], axis=-1).reshape(len(pos), 4, 12)
+
+
+class Dispersion(Task):
+    """Four agents, which start in the centre, spread to eat four pieces of food."""
+
+    mission = game(
+        "dispersion",
+        Block(
+            name="agent", team=AGENTS, count=4, radius=0.035, variance=(0, 0, 0), autonomy=PushToOwn(),
+            motion=WalledParticle(),
+        ),
+        particles("food", 4, 0.05, LANDMARKS, motion=Still()),
+        interactions=[Meals()],
+    )  # fmt: skip
+    time_limit = 10.0
+    learners = "agent"
+    observation = (Own("pos vel", planar=True), Computed(12, food))
+    action = (Act("push_x", -1.0, 1.0), Act("push_y", -1.0, 1.0))
+    reward = {"meals": Term(meals)}  # noqa: RUF012
+
+    def ends(self, now: Situation) -> np.ndarray:
+        """All food has been eaten."""
+        return np.asarray(now.simulation.read("Meals.eaten")[0].all(axis=1))
+
+
+__all__ = ["Dispersion", "Particle", "ParticleContact", "SimpleAdversary", "SimpleSpread", "SimpleTag"]

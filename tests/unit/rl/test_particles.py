@@ -1,4 +1,4 @@
-"""Games of particles are those of MPE2: the same first states and actions give the same trajectories, observations and rewards."""
+"""Games of particles are those of MPE2 and VMAS: the same first states and actions give the same trajectories, observations and rewards."""
 
 import importlib
 import warnings
@@ -6,7 +6,7 @@ import warnings
 import numpy as np
 import pytest
 
-from tussle.rl import SimpleAdversary, SimpleSpread, SimpleTag, make_swarm
+from tussle.rl import Dispersion, SimpleAdversary, SimpleSpread, SimpleTag, make_swarm
 
 GAMES = {"simple_tag_v3": SimpleTag, "simple_spread_v3": SimpleSpread, "simple_adversary_v3": SimpleAdversary}
 
@@ -88,3 +88,38 @@ def test_the_goal_is_drawn_per_episode_and_unknown_to_the_adversary():
     np.testing.assert_array_equal(
         other.reset(seeds, params={"GoalLandmark.number": (1 - goals).tolist()})[:, 0], blind
     )
+
+
+@pytest.mark.needs("vmas", "torch")
+def test_trajectories_of_dispersion_are_those_of_vmas(monkeypatch):
+    import torch
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        vmas = importlib.import_module("vmas")
+    monkeypatch.setattr(torch, "float32", torch.float64)  # it computes in what it calls so
+    peer = vmas.make_env("dispersion", num_envs=3, continuous_actions=True, seed=1, device="cpu")
+    seen = peer.reset()
+    swarm = make_swarm(Dispersion(dtype=np.float64), 3, autoreset="disabled")
+    swarm.reset(seed=1)
+    pos, _ = swarm.simulation.read("food.pos")
+    pos[..., :2] = np.stack([piece.state.pos.numpy() for piece in peer.world.landmarks], axis=1)
+    swarm.simulation.write("food.pos", pos)
+    chance, eaten = np.random.default_rng(2), np.zeros(3)
+    for k in range(99):
+        own = np.stack([each[:, :2].numpy() for each in seen], axis=1)
+        target = np.stack([each[:, 4 + 3 * a : 6 + 3 * a].numpy() for a, each in enumerate(seen)], axis=1)
+        if k < 40:  # two go for one piece, until all run against walls
+            target[:, 1] = target[:, 0] + own[:, 0] - own[:, 1]
+        actions = np.clip(5.0 * target + chance.normal(0.0, 0.3, (3, 4, 2)) + (k > 60), -1.0, 1.0)
+        seen, gained, is_over, _ = peer.step([torch.tensor(actions[:, a]) for a in range(4)])
+        obs, rewards, terminated, *_ = swarm.step(actions)
+        np.testing.assert_allclose(obs, np.stack([each.numpy() for each in seen], axis=1), rtol=0, atol=1e-9)
+        np.testing.assert_allclose(
+            rewards, np.stack([each.numpy() for each in gained], axis=1), rtol=0, atol=1e-9
+        )
+        eaten += rewards.sum(axis=1)
+        if is_over.any():
+            break
+    assert terminated.tolist() == is_over.tolist()
+    assert (eaten > 2.0).all()
