@@ -6,6 +6,7 @@ import os
 import signal
 from pathlib import Path
 
+import needs
 from playwright.sync_api import Browser
 from playwright.sync_api import Page as Tab
 from waiting import wait_until
@@ -95,9 +96,8 @@ class Watched:
 
 def another_browser(browser: Browser, flag: str) -> Browser:
     """One of the same kind in processes of its own, that can be told by a flag."""
-    (running,) = {Path(f"/proc/{pid}/exe").resolve() for pid in family_of("--use-angle=swiftshader")[:1]}
     options = ("--no-sandbox", "--enable-unsafe-swiftshader", "--use-angle=swiftshader", flag)
-    return browser.browser_type.launch(executable_path=running, args=list(options))
+    return browser.browser_type.launch(executable_path=needs.program(*needs.BROWSERS), args=list(options))
 
 
 def family_of(flag: str) -> list[int]:

@@ -35,9 +35,9 @@ SETTINGS = {
     "x86-64-v3": {"NUMBA_CPU_NAME": "x86-64-v3", "NUMBA_CPU_FEATURES": ""},
     "unoptimised": {"NUMBA_OPT": "0"},
 }
-for wide, features in processor.WIDE.items():
-    if processor.level() == wide:
-        SETTINGS[wide] = {"NUMBA_CPU_NAME": wide, "NUMBA_CPU_FEATURES": features}
+"""Besides what this process plays, which is the highest level that this machine has."""
+if processor.level() == "x86-64-v3":
+    del SETTINGS["x86-64-v3"]
 HASH = "6253fd21ad5e16a14a2ea4ee17c8ac88"
 """What PROGRAM prints; another one is a change of numbers, which the changelog tells."""
 

@@ -93,8 +93,8 @@ export class Live extends Layer {
     if (rows.length || from < this.rows.length) {
       this.rows = [...this.rows.slice(0, from), ...rows];
       this.setEvents(this.rows);
+      this.changed();
     }
-    this.changed();
   }
 
   /** Columns of an entity's plugins, and its messages. @param {number} id @returns {Section[]} */

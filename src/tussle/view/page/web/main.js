@@ -19,7 +19,7 @@ function publish(player) {
     get t() { return player.clock.t; },
     get frame() { return layer.shown.frame; },
     /** Whether the page shows what is true now, and nothing moves by itself. */
-    get isDrawn() { return !player.isChanged && layer.isSettled && player.drawnTime === player.clock.t && (player.clock.isPlaying || !player.picture.isHalf); },
+    get isDrawn() { return !player.isChanged && !player.isTold && layer.isSettled && player.drawnTime === player.clock.t && (player.clock.isPlaying || !player.picture.isHalf); },
     get nFrames() { return page.nFrames; },
     get isPlaying() { return player.clock.isPlaying; },
     get speed() { return player.clock.speed; },

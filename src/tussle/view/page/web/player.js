@@ -53,6 +53,8 @@ export class Player {
     this.chosen = 0;
     this.hovered = 0;
     this.isChanged = true;
+    /** There is news that only the panels show. */
+    this.isTold = false;
     this.isReady = false;
     this.isShown = false;
     this.isPicking = false;
@@ -161,7 +163,7 @@ export class Player {
     if (!this.isLost) this.panels.showStatus(status, this.drawRate);
     if (status.isDriveRefused) this.drive.release();
     if (status.refusal) this.say(status.refusal);
-    this.look();
+    this.isTold = true;
   }
 
   /** Send a command to a live game; a recording takes none. @param {string} command */
@@ -281,7 +283,7 @@ export class Player {
       if (this.isChanged || isMoving) {
         this.isChanged = isMoving;
         this.draw();
-      }
+      } else if (this.isTold) this.showPanels();
       if (this.clock.isPlaying) this.layer.lookAhead();
     }
     requestAnimationFrame((next) => this.tick(next));
@@ -305,6 +307,14 @@ export class Player {
       if (shapes.header.notes.length) this.panels.showNotes([...new Set([...this.page.notes, ...shapes.header.notes])]);
     }
     this.picture.draw();
+    this.showPanels();
+    this.drawnTime = clock.t;
+  }
+
+  /** Show in the panels what is true now. */
+  showPanels() {
+    const { clock } = this;
+    this.isTold = false;
     this.panels.showTeams(clock.t);
     this.panels.showChosen(this.chosen, this.camera.mode, clock.t);
     this.orders.show();
@@ -315,7 +325,6 @@ export class Player {
     this.events.update(clock.t);
     clock.show(clock.t, clock.isPlaying, clock.speed);
     this.showButtons();
-    this.drawnTime = clock.t;
   }
 
   showButtons() {
