@@ -66,6 +66,17 @@ def test_buttons_step_play_and_pause(game):
     assert live.step_number == there
 
 
+def test_news_of_the_panels_do_not_draw_a_game_anew_that_stands_still(game):
+    live, _, watched = game
+    watched.wait("player.isDrawn")
+    n_drawn = watched.tab.evaluate("() => player.nDrawn")
+    live.warp = 2.0
+    watched.wait("player.status.warp === 2 && player.isDrawn")
+    assert watched.tab.locator("#speed").inner_text() == "2×"
+    assert watched.tab.evaluate("() => player.nDrawn") == n_drawn
+    live.warp = 1.0
+
+
 def test_frames_are_those_that_the_browser_draws_and_states_those_that_are_sent(game):
     live, _, watched = game
     live.seek(0.0)
