@@ -71,7 +71,7 @@ def main() -> None:
     asked = parser.parse_args()
     software = [] if asked.graphics_card else ["--enable-unsafe-swiftshader", "--use-angle=swiftshader"]
     with sync_playwright() as playwright:
-        program = shutil.which("chromium")
+        program = shutil.which("chromium") or shutil.which("chromium-headless-shell")
         browser = playwright.chromium.launch(executable_path=program, args=["--no-sandbox", *software])
         print("entities  3D: frames/s  script [ms]  map: frames/s  script [ms]")
         for n in asked.sizes:

@@ -381,7 +381,7 @@ def main() -> None:
     """Make those that are named, or all."""
     with sync_playwright() as playwright:
         options = ("--no-sandbox", "--enable-unsafe-swiftshader", "--use-angle=swiftshader")
-        program = shutil.which("chromium")
+        program = shutil.which("chromium") or shutil.which("chromium-headless-shell")
         browser = playwright.chromium.launch(executable_path=program, args=list(options))
         for name in sys.argv[1:] or PICTURES:
             PICTURES[name](browser)

@@ -6,7 +6,6 @@ import os
 import signal
 from pathlib import Path
 
-import needs
 from playwright.sync_api import Browser
 from playwright.sync_api import Page as Tab
 from waiting import wait_until
@@ -96,6 +95,8 @@ class Watched:
 
 def another_browser(browser: Browser, flag: str) -> Browser:
     """One of the same kind in processes of its own, that can be told by a flag."""
+    import needs  # pictures.py has no tests on its path
+
     options = ("--no-sandbox", "--enable-unsafe-swiftshader", "--use-angle=swiftshader", flag)
     return browser.browser_type.launch(executable_path=needs.program(*needs.BROWSERS), args=list(options))
 

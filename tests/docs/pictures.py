@@ -37,7 +37,10 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder, sync_playwright() as play:
         os.chdir(folder)
         called(BATCH, 80)
-        browser = play.chromium.launch(executable_path=shutil.which("chromium"), args=["--no-sandbox"])
+        browser = play.chromium.launch(
+            executable_path=shutil.which("chromium") or shutil.which("chromium-headless-shell"),
+            args=["--no-sandbox"],
+        )
         for columns in (80, 120):
             width = round(12.2 * min(columns, 100)) + 18  # of the terminal in the SVG [pixels]
             page = browser.new_page(viewport={"width": width, "height": 600})
