@@ -11,12 +11,13 @@ import subprocess
 import sys
 import warnings
 from concurrent.futures import ThreadPoolExecutor
+from itertools import product
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from tussle.numeric import processor, store
+from tussle.numeric import operator_types, processor, store
 from tussle.numeric.fingerprint import Fingerprint
 from tussle.numeric.kernel import built, device, kernel, lean_routine, stats
 
@@ -211,6 +212,53 @@ def test_a_device_gets_an_entry_for_python_when_python_calls_it():
     (inside,) = scaled.dispatcher.overloads.values()
     assert not re.findall("cpython|cfunc", inside.library.get_llvm_str())
     assert scaled(3.0) == 6.0
+
+
+def test_operators_on_numbers_have_the_types_that_numba_gives_them():
+    from numba import types
+    from numba.core.errors import NumbaError
+    from numba.core.registry import cpu_target
+
+    operator_types.type_numbers()
+    context = cpu_target.typing_context
+    context.refresh()
+    kinds = [types.int64, types.float64, types.boolean, types.uint64, types.int32, types.float32]
+    kinds += [types.literal(3), types.literal(True)]
+
+    def found(function, arguments):
+        try:
+            signature = function.get_call_type(context, arguments, {})
+        except NumbaError:
+            return None
+        return signature.return_type, signature.args
+
+    for each in operator_types.OPERATORS:
+        with_rule = context.resolve_value_type(each)
+        others = [t for t in with_rule.templates if t is not operator_types.rule(each)]
+        assert len(others) < len(with_rule.templates)
+        for arguments in product(kinds, repeat=1 if each is bool else 2):
+            of_numba = found(type(with_rule)(others), arguments)
+            assert found(with_rule, arguments) == of_numba, (each, arguments)
+
+
+@device
+def item(things, place):
+    return things[place]
+
+
+def test_a_device_is_compiled_once_for_all_constants_unless_it_needs_them(own_cache, forget_kernels):
+    @device
+    def doubled(k):
+        return k + k
+
+    @kernel("F I i8 -> f8 i8")
+    def run(x, n, k):
+        things = x, n
+        return item(things, 0)[1], item(things, 1)[0] + doubled(3) + doubled(True) + doubled(k)
+
+    assert run(np.arange(2.0), np.array([7]), 20) == (1.0, 7 + 6 + 2 + 40)
+    assert len(doubled.dispatcher.overloads) == 2  # of integers and of truths
+    assert len(item.dispatcher.overloads) == 2
 
 
 def test_garbage_is_not_looked_for_while_a_kernel_compiles():

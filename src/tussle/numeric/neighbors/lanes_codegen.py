@@ -16,10 +16,10 @@ from numba import types
 from numba.core import cgutils
 from numba.core.datamodel import models, register_default
 from numba.core.registry import cpu_target
-from numba.core.typing.templates import AbstractTemplate, infer_global, signature
 from numba.extending import lower_builtin
 
 from tussle.numeric.neighbors.lane_count import LANES, RSQRT_MAGIC
+from tussle.numeric.operator_types import rule
 
 _DOUBLES = ir.VectorType(ir.DoubleType(), LANES)
 _LONGS = ir.VectorType(ir.IntType(64), LANES)
@@ -70,28 +70,6 @@ def type_of(function: Callable[..., Any]) -> Any:
     return cpu_target.typing_context.resolve_value_type(function)
 
 
-@cache
-def _template(function: Callable[..., Any]) -> Any:
-    """Numba's typing template of a function; `ways` holds the result and argument types of each overload."""
-
-    class Template(AbstractTemplate):
-        key = function
-        metadata = {"target": "cpu"}  # tried before the operator's own templates, of which there are dozens  # noqa: RUF012
-        ways: list[tuple[Any, tuple[Any, ...]]] = []  # noqa: RUF012
-
-        def generic(self, args: Any, kws: Any) -> Any:
-            for result, arguments in self.ways:
-                if len(args) == len(arguments) and all(
-                    given == wanted or (isinstance(wanted, type) and isinstance(given, wanted))
-                    for given, wanted in zip(args, arguments, strict=True)
-                ):
-                    return None if kws else signature(result, *args)
-            return None
-
-    infer_global(function, types.Function(Template))
-    return Template
-
-
 def _implement(function: Any, result: Any, *arguments: Any) -> Callable[[Any], Any]:
     """Decorator that registers a code generator of `function(*arguments) -> result`; functions given by name register on first use."""
 
@@ -100,7 +78,7 @@ def _implement(function: Any, result: Any, *arguments: Any) -> Callable[[Any], A
             _BY_NAME[function].append((result, arguments, generate))
             return generate
 
-        _template(function).ways.append((result, arguments))
+        rule(function).ways.append((result, arguments))
         lower_builtin(function, *arguments)(generate)
         return generate
 
