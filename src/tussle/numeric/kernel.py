@@ -23,12 +23,7 @@ from weakref import WeakSet
 import numpy as np
 
 from tussle.numeric import processor, store
-from tussle.numeric.device_compiler import (
-    device_compiler,
-    kernel_compiler,
-    set_environments,
-    share_constants,
-)
+from tussle.numeric.device_compiler import device_compiler, set_environments, share_constants
 from tussle.numeric.fingerprint import Fingerprint, package
 from tussle.numeric.operator_types import type_numbers
 
@@ -207,7 +202,8 @@ class Device:
                 pipeline_class=device_compiler(),
                 **self.options,
             )
-            share_constants(self._dispatcher)
+            if self.options.get("forceinline"):  # a larger function may be the faster for a constant
+                share_constants(self._dispatcher)
         return self._dispatcher
 
     @property
@@ -329,13 +325,7 @@ class Kernel(Device):
             return str(library.codegen._tm.emit_assembly(library._get_module_for_linking()))
 
     def _new_dispatcher(self, key: str) -> Any:
-        return jitted(
-            renamed(self.py_func, key),
-            nogil=True,
-            no_cfunc_wrapper=True,
-            pipeline_class=kernel_compiler(),
-            **self.options,
-        )
+        return jitted(renamed(self.py_func, key), nogil=True, no_cfunc_wrapper=True, **self.options)
 
     def _build(self) -> None:
         from numba.core.compiler_lock import global_compiler_lock
