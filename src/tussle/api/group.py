@@ -182,6 +182,7 @@ class GroupView:
 
     @property
     def draw(self) -> Draw:
+        self._differs("draws shapes before `finish`")
         return self.context.draw
 
     @property
@@ -505,5 +506,6 @@ class GroupView:
 
     def call(self, service: str, *args: Any, **kwargs: Any) -> Any:
         """Call a service of the entity's plugins, with this view as first argument, or of the world plugins."""
+        self._differs("calls the service", service)
         function = self.context.find_service(service, self.services)
         return function(self, *args, **kwargs) if service in self.services else function(*args, **kwargs)

@@ -8,7 +8,10 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
+import numpy as np
+
 from tussle.api.group import GroupView
+from tussle.api.motion import WRITABLE
 from tussle.engine import failure
 from tussle.engine.calls import Call
 from tussle.engine.state import SimulationState
@@ -101,18 +104,31 @@ class JoinedCalls:
         group = next(g for g in self.state.population.groups if view in g.views)
         return failure.in_call(error, plugin, view, group)
 
+    def _columns(self) -> list[np.ndarray]:
+        """The arrays that plugins of the calls may change, by kernels."""
+        groups = [g for g in self.state.population.groups if any(view in self.views for view in g.views)]
+        moved = [getattr(g.motion_view, name) for g in groups for name in WRITABLE]
+        return moved + [
+            b.plugin.__dict__[k] for g in groups for b in g.walk() for k in b.places if k in b.writable
+        ]
+
     def _record(self) -> None:
         bodies, context = self.state.population.bodies, self.state.context
         bodies.touch(0, bodies.n)
         ends, later, callers = [], [], []
         try:
-            with recording() as recorded:
+            with recording(self._columns()) as recorded:
                 for call in self.calls:
                     context.later = []
                     call.run()
                     ends.append(len(recorded.calls))
                     later.append(context.later)
                     callers.append((call.views[0], call.views[0]._caller))
+        except PluginError as error:
+            if isinstance(error.cause, ValueError) and "read-only" in str(error.cause):
+                promise = f"{error.plugin} promises only_calls_kernels, but changes a column without a kernel"
+                error.message = f"{promise}: {error.message}"
+            raise
         finally:
             context.later = None
         before, self.recorded = self.recorded, recorded.calls

@@ -21,23 +21,27 @@ _is_recording = threading.Lock()
 class KernelCalls:
     """Calls of kernels of one thread, in order.
 
+    Args:
+        locked: Arrays that only kernels may change meanwhile.
+
     Attributes:
         calls: Kernels with their arguments.
         is_whole: Whether these are all calls, and each returned nothing or True. Then they can be made again, up to one that does not
             return True.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, locked: Sequence[np.ndarray] = ()) -> None:
         self.calls: list[tuple[Any, ...]] = []
         self.is_whole = True
         self._thread = threading.get_ident()
+        self._spans = [span_of(array) for array in locked]
 
     def listener(self, each: Kernel) -> Callable[..., Any]:
         """Return a function that calls a kernel and records the call."""
         run = each.machine_code
 
         def call(*arguments: Any, **named: Any) -> Any:
-            found = run(*arguments, **named)
+            found = self.unlocked(run, *arguments, **named)
             if threading.get_ident() == self._thread:
                 self.calls.append((each, *arguments))
                 self.is_whole &= (found is None or found is True) and not named
@@ -45,22 +49,61 @@ class KernelCalls:
 
         return call
 
+    def unlocked(self, run: Callable[..., Any], *arguments: Any, **named: Any) -> Any:
+        """Call a function that may change what is locked of its arguments."""
+        given = (*arguments, *named.values())
+        flat = [each for one in given for each in (one if isinstance(one, tuple) else (one,))]
+        locked = [
+            each
+            for each in flat
+            if isinstance(each, np.ndarray) and not each.flags.writeable and self._has_locked(each)
+        ]
+        try:
+            for each in locked:
+                each.flags.writeable = True
+            return run(*arguments, **named)
+        finally:
+            for each in locked:
+                each.flags.writeable = False
+
+    def _has_locked(self, array: np.ndarray) -> bool:
+        first, last = span_of(array)
+        return threading.get_ident() == self._thread and any(a <= first and last <= b for a, b in self._spans)
+
 
 @contextmanager
-def recording() -> Iterator[KernelCalls]:
-    """Record the calls of kernels in this thread. Where another thread records, nothing is recorded, and the calls are not whole."""
-    recorded = KernelCalls()
+def recording(locked: Sequence[np.ndarray] = ()) -> Iterator[KernelCalls]:
+    """Record the calls of kernels in this thread. Where another thread records, nothing is recorded, and the calls are not whole.
+
+    Args:
+        locked: Arrays that are read-only meanwhile, but for kernels.
+    """
+    locked = [array for array in locked if array.flags.writeable]
+    recorded, slow_call = KernelCalls(locked), Kernel.__call__
+
+    def first_call(each: Kernel, *arguments: Any, **named: Any) -> Any:
+        found = recorded.unlocked(slow_call, each, *arguments, **named)
+        if each in ready:
+            each.call_by(recorded.listener(each))
+        return found
+
     if not _is_recording.acquire(blocking=False):
         recorded.is_whole = False
         yield recorded
         return
-    kernels, before = list(ready), (len(ready), stats.interpreted)
+    before = len(ready), stats.interpreted
     try:
-        for each in kernels:
+        Kernel.__call__ = first_call  # type: ignore[method-assign]
+        for each in list(ready):
             each.call_by(recorded.listener(each))
+        for array in locked:
+            array.flags.writeable = False
         yield recorded
     finally:
-        for each in kernels:
+        for array in locked:
+            array.flags.writeable = True
+        Kernel.__call__ = slow_call  # type: ignore[method-assign]
+        for each in list(ready):
             each.call_by(None)
         # New kernels, and those that ran as Python, have not been listened to.
         recorded.is_whole &= before == (len(ready), stats.interpreted)
@@ -114,6 +157,12 @@ def are_same(before: Sequence[tuple[Any, ...]], now: Sequence[tuple[Any, ...]]) 
                     if not any(start <= at < end for start, end in written):
                         return False
     return True
+
+
+def span_of(array: np.ndarray) -> tuple[int, int]:
+    """Addresses of the first byte of an array, and of the first behind it, if it is contiguous or a part of the columns of a table."""
+    first, last = np.lib.array_utils.byte_bounds(array)
+    return int(first), int(last)
 
 
 def address_of(array: np.ndarray) -> int:

@@ -11,7 +11,7 @@ from tussle.engine.calls import Call
 from tussle.engine.joined_calls import JoinedCalls
 from tussle.engine.simulation import Simulation
 from tussle.engine.state import SimulationState
-from tussle.errors import ConformanceError
+from tussle.errors import ConformanceError, PluginError
 from tussle.testing.game import SEEDS, STEPS, ConformanceGame
 from tussle.testing.traces import Traces, columns_of, first_difference
 
@@ -120,8 +120,11 @@ def check_kernels(game: ConformanceGame) -> None:
             each.state.context.steady_steps = steady, steady
             each.schedule.join = partial(_each_joined, each.state)
         for step in range(STEPS):
-            sim.step()
             other.step()
+            try:
+                sim.step()
+            except PluginError as error:
+                raise ConformanceError(cls.__name__, "only_calls_kernels", str(error)) from error
             if difference := first_difference(columns_of(other, 0), columns_of(sim, 0)):
                 text = (
                     f"its step versus the kernels that it calls, alone: after step {step + 1}, {difference}"

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tussle import Block, Mission, Simulation
-from tussle.api import Autonomy, Input, MotionModel, Output, Param, Publish, State, neighbors
+from tussle.api import Autonomy, Input, MotionModel, Output, Param, Publish, State, neighbors, service
 from tussle.engine.joined_calls import Joined, JoinedCalls
 from tussle.errors import PluginError
 from tussle.messages import CaptureEntity
@@ -297,8 +297,15 @@ class Breaks(Spiral):
     """Does what its promise excludes, by name."""
 
     only_calls_kernels = True
-    what = Param("time", choices=("time", "draws", "steps", "publishes"))
+    what = Param(
+        "time",
+        choices=("time", "draws", "steps", "publishes", "shapes", "service", "state", "output", "later"),
+    )
     capture = Publish(CaptureEntity)
+
+    @service
+    def gait(self, g):
+        return 1.0
 
     def step(self, g):
         if self.what == "time":
@@ -307,9 +314,20 @@ class Breaks(Spiral):
             self.angle[:] = g.uniform("angle")
         elif self.what == "steps":
             g.step(self, self.angle < 0.0)
-        else:
+        elif self.what == "publishes":
             self.capture.publish([0], target=1)
+        elif self.what == "shapes":
+            g.draw.points(pos=g.pos)
+        elif self.what == "service":
+            g.call("gait")
         super().step(g)
+        if self.what == "state":
+            self.angle += 0.1
+        elif self.what == "output":
+            velocity_x = self.velocity[0]
+            np.minimum(velocity_x, 1e9, out=velocity_x)  # has no effect yet
+        elif self.what == "later":
+            g.finish(lambda: self.angle.fill(1.0))
 
 
 @pytest.mark.parametrize(
@@ -319,6 +337,11 @@ class Breaks(Spiral):
         ("draws", "draws 'angle'"),
         ("steps", "steps Breaks for some rows"),
         ("publishes", "publishes before `finish`"),
+        ("shapes", "draws shapes before `finish`"),
+        ("service", "calls the service 'gait'"),
+        ("state", "changes a column without a kernel: .*read-only"),
+        ("output", "changes a column without a kernel: .*read-only"),
+        ("later", "changes a column without a kernel: .*read-only"),
     ],
 )
 def test_a_plugin_that_does_more_than_it_promises_is_refused(what, text):
@@ -435,6 +458,31 @@ def test_no_kernel_runs_twice_in_a_step_and_no_list_is_read_where_it_was(mission
         mission, [3, 4], lambda simulation, step: few_spans(simulation) if step == 12 else None, steps=20
     )
     assert joined == apart
+
+
+class Slips(Spring):
+    """Does more than its kernels, by name."""
+
+    only_calls_kernels = True
+    what = Param("pos", choices=("pos", "state"))
+
+    def to_body(self, body):
+        super().to_body(body)
+        if self.what == "pos":
+            body.pos[2] = 0.0
+        else:
+            self.turns.fill(0.0)
+
+
+@pytest.mark.parametrize("what", ["pos", "state"])
+def test_a_motion_model_that_does_more_than_it_promises_is_refused(what):
+    mission = swarm(Spiral())
+    mission = mission.replace(blocks=[mission.blocks[0].replace(motion=Slips(what=what), radius=0.3)])
+    with (
+        started(mission, [1], 12) as simulation,
+        pytest.raises(PluginError, match="Slips promises only_calls_kernels, but changes a column"),
+    ):
+        simulation.run()
 
 
 class Doubles(Spiral):
