@@ -9,6 +9,7 @@ import numpy as np
 
 from tussle.api.group import GroupView
 from tussle.api.plugin import HistoricAttributes, Plugin
+from tussle.api.results import named, number
 from tussle.api.row_laws import step_rows
 from tussle.api.world import WorldView
 from tussle.declare.columns import EntityRef, Output, Param
@@ -129,23 +130,24 @@ class WorldPlugin(Plugin):
         """Results of one world: name -> number, or name -> {team: number}.
 
         Raises:
-            ParameterError: A result has another shape.
+            ParameterError: A result has another shape, or is no number.
         """
+        where = f"{type(self).__name__}.result"
         out: dict[str, Any] = {}
         by_world, by_team = (w.n_worlds,), (len(w.teams), w.n_worlds)
-        for name, value in self.result(w).items():
-            array = np.asarray(value)
+        for name, value in named(self.result(w), where).items():
+            array = np.asarray(value, None if isinstance(value, np.ndarray) else object)
             allowed = [by_team] if name == "score" and isinstance(self, Metric) else [by_world, by_team]
             if array.shape not in allowed:
                 raise ParameterError(
-                    f"{type(self).__name__}.result: {name!r} has the shape {array.shape}; it takes "
+                    f"{where}: {name!r} has the shape {array.shape}; it takes "
                     + " or ".join(
                         f"{shape}, one per {'world' if shape == by_world else 'team and world'}"
                         for shape in allowed
                     )
                 )
-            item = array[..., world]
-            out[name] = dict(zip(w.teams.tolist(), item.tolist(), strict=True)) if item.ndim else item.item()
+            values = [number(each, f"{where}: {name!r}", "numbers") for each in array[..., world].flat]
+            out[name] = dict(zip(w.teams.tolist(), values, strict=True)) if array.ndim > 1 else values[0]
         return out
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -42,9 +43,11 @@ class WorldResult:
 
     @property
     def winner(self) -> int | None:
-        """Team with a higher score than every other; None on a tie, without scores, and where another's is not a number."""
+        """Team with a higher score than every other; None on a tie, without scores, and where its own or another's is not a number."""
         for team, score in self.scores.items():
-            if all(score > other for rival, other in self.scores.items() if rival != team):
+            if not math.isnan(score) and all(
+                score > other for rival, other in self.scores.items() if rival != team
+            ):
                 return team
         return None
 

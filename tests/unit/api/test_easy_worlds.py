@@ -339,6 +339,8 @@ def test_the_world_and_the_line_that_failed_are_named():
         ({"score": 3.0}, "Judge.result_one: 'score' = 3.0 is not allowed"),
         ({"score": {1: 2.0}}, "Judge.result_one: 'score' has no value for team 2"),
         ({"lost": {1: 2.0, 2: 1.0, 3: 4.0}}, "Judge.result_one: 'lost': there is no team 3; there are: 1, 2"),
+        (None, "Judge.result_one returns None; it takes a dict"),
+        ({3: 1.0}, "Judge.result_one: 3 is not a name"),
         ({"name": "red"}, "Judge.result_one: 'name' = 'red' is not allowed"),
         (
             {"many": 10**5000},

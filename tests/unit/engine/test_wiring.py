@@ -477,12 +477,21 @@ def test_columns_of_teams_and_worlds_for_world_plugins():
         ("east", lambda w: w.pos[0], r"Odd.result: 'east' has the shape \(10,\); it takes \(2,\), one per world or \(2, 2\)"),
         ("n", lambda w: w.n, r"'n' has the shape \(\)"),
         ("score", lambda w: np.zeros(w.n_worlds), r"'score' has the shape \(2,\); it takes \(2, 2\), one per team and world"),
+        ("lists", lambda w: [[1], [1, 2]], r"Odd.result: 'lists' = \[1\] is not allowed; it takes numbers"),
+        ("texts", lambda w: np.array(["a", "b"]), r"'texts' = .*'a'\)? is not allowed; it takes numbers"),
+        ("complex", lambda w: np.array([1j, 2.0]), r"'complex' = .*1j\)? is not allowed"),
+        ("objects", lambda w: [None, {}], r"'objects' = None is not allowed"),
+        ("dates", lambda w: np.array(["2020-01-01"] * 2, "M8[D]"), r"'dates' = .*2020-01-01'\)? is not allowed"),
+        ("large", lambda w: [10**400, 1], r"'large' is a whole number of 1,329 bits"),
+        (7, lambda w: np.zeros(2), r"Odd.result: 7 is not a name; it takes a text without line breaks"),
+        ("a\nb", lambda w: np.zeros(2), r"Odd.result: 'a\\nb' is not a name"),
+        (None, lambda w: None, r"Odd.result returns None; it takes a dict"),
     ],
 )  # fmt: skip
 def test_a_result_has_one_value_per_world_or_team(name, value, text):
     class Odd(Metric):
         def result(self, w):
-            return {name: value(w)}
+            return {name: value(w)} if name else value(w)
 
     game = mission(block("a", team=7, count=2), block("b", team=3, count=3), metrics=[Odd()])
     with pytest.raises(PluginError, match=text):
@@ -491,7 +500,7 @@ def test_a_result_has_one_value_per_world_or_team(name, value, text):
 
 @pytest.mark.parametrize(
     ("scores", "winner"),
-    [({1: nan, 2: 5.0}, None), ({1: 5.0, 2: nan}, None), ({1: -inf, 2: inf}, 2), ({1: inf, 2: inf}, None), ({4: 0.0}, 4)],
+    [({1: nan, 2: 5.0}, None), ({1: 5.0, 2: nan}, None), ({1: -inf, 2: inf}, 2), ({1: inf, 2: inf}, None), ({4: 0.0}, 4), ({4: nan}, None)],
 )  # fmt: skip
 def test_nobody_wins_against_a_score_that_is_no_number(scores, winner):
     assert WorldResult(0, 1, "time", 1, 0.1, {}, scores=scores).winner == winner

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterable, Mapping
 from typing import Any, ClassVar
 
@@ -15,9 +14,13 @@ from tussle.api.easy.worlds import WorldShared, make_world_types
 from tussle.api.group import GroupView
 from tussle.api.kinds import Autonomy, Controller, EntityPlugin, Interaction, Metric, Sensor, WorldPlugin
 from tussle.api.plugin import Plugin
+from tussle.api.results import named, number
 from tussle.api.world import WorldView
 from tussle.declare.columns import Param
 from tussle.errors import ParameterError, listed, nearest_name
+
+NUMBERS = "a number, or {team: number}"
+"""What a result of one world may be."""
 
 
 class EasyPlugin(Plugin):
@@ -152,7 +155,7 @@ class EasyWorldPlugin(EasyPlugin, WorldPlugin):
 
     def result_of(self, w: WorldView, world: int) -> dict[str, Any]:
         shared = WorldShared(self, w, "result_one ")
-        found = shared.author.result_one(shared.world(world))
+        found = named(shared.author.result_one(shared.world(world)), f"{type(self).__name__}.result_one")
         return {name: self._reported(name, value, shared.teams) for name, value in found.items()}
 
     def _reported(self, name: str, value: Any, teams: Iterable[int]) -> Any:
@@ -162,7 +165,7 @@ class EasyWorldPlugin(EasyPlugin, WorldPlugin):
                 raise ParameterError(
                     f"{where} = {value!r} is not allowed; it takes {{team: number}}, with a number for each team"
                 )
-            return _number(where, value)
+            return number(value, where, NUMBERS)
         for team in teams:
             if team not in value:
                 raise ParameterError(f"{where} has no value for team {team}; it takes a number for each team")
@@ -172,18 +175,7 @@ class EasyWorldPlugin(EasyPlugin, WorldPlugin):
                 raise ParameterError(
                     f"{where}: there is no team {team!r}{nearest_name(str(team), names)}; {listed(names)}"
                 )
-        return {team: _number(where, value[team]) for team in teams}
-
-
-def _number(where: str, value: Any) -> Any:
-    number = value.item() if isinstance(value, np.generic) else value
-    if not isinstance(number, (bool, int, float)):
-        raise ParameterError(f"{where} = {value!r} is not allowed; it takes a number, or {{team: number}}")
-    if isinstance(number, int) and abs(number) > sys.float_info.max:
-        raise ParameterError(
-            f"{where} is a whole number of {number.bit_length():,} bits; it takes up to 1,024"
-        )
-    return number
+        return {team: number(value[team], where, NUMBERS) for team in teams}
 
 
 class EasyInteraction(EasyWorldPlugin, Interaction):
