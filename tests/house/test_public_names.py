@@ -52,6 +52,13 @@ def test_a_part_shows_no_names_that_it_only_uses(path):
     assert shown <= set(getattr(module, "__all__", ()))
 
 
+@pytest.mark.parametrize("name", ["tussle.stock", "tussle.historic"])
+def test_a_star_imports_all_plugins_and_nothing_else(name):
+    found: dict[str, object] = {}
+    exec(f"from {name} import *", found)
+    assert set(found) - {"__builtins__"} == set(dir(import_module(name)))
+
+
 def test_what_users_begin_with():
     assert {"Mission", "Recorder", "Simulation", "load_run", "read_mission"} <= set(dir(tussle))
     assert not {"Any", "TYPE_CHECKING", "nearest_name"} & set(dir(tussle))

@@ -29,6 +29,8 @@ def load(name: str) -> Any:
 
 
 def __getattr__(name: str) -> Any:
+    if name == "__all__":
+        return __dir__()  # for `from tussle.historic import *`
     if not name.startswith("_") and name in manifest():
         return load(name)
     hint = "" if name.startswith("_") else nearest_name(name, manifest())

@@ -86,6 +86,8 @@ def adapters(module: Mapping[str, Any]) -> list[Any]:
 
 
 def __getattr__(name: str) -> Any:
+    if name == "__all__":
+        return __dir__()  # for `from tussle.stock import *`
     if not name.startswith("_") and name in manifest():
         return load(name)
     raise AttributeError(
