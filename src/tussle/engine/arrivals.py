@@ -33,7 +33,7 @@ def reset(
     if params:
         state.overrides.set(params, numbers)
     if seeds is not None:
-        state.context.seeds[numbers] = [s % 2**64 for s in seeds]
+        state.context.seeds[numbers] = np.array(seeds, np.uint64)
     state.context.keys[chosen] = state.context.seeds[chosen]
     clock, view = state.context.clock, state.world_view
     clock.step[chosen] = 0

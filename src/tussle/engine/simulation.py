@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 import warnings
 import weakref
@@ -18,6 +19,7 @@ from tussle.api.plugin import GRADES
 from tussle.declare.columns import Handle
 from tussle.declare.displays import counted, line, listing, page, table
 from tussle.declare.messages import Message, Messages
+from tussle.documents import Maybe, Real, Whole, check_argument
 from tussle.engine import access
 from tussle.engine.arrivals import reset, spawn_due
 from tussle.engine.calls import Schedule
@@ -40,6 +42,8 @@ from tussle.record.inputs import COLUMN, GIVER, ExternalInput, fields_of, given_
 
 if TYPE_CHECKING:
     from tussle.record import FirstStates
+
+MAX_SEED = 2**64 - 1
 
 
 class Simulation:
@@ -84,8 +88,7 @@ class Simulation:
         if seeds is None:
             seeds = 1 if seed is None else seed
         numbers = list(seeds) if isinstance(seeds, Iterable) else [seeds]
-        if isinstance(threads, bool) or int(threads) != threads or threads < 1:
-            raise ParameterError(f"threads = {threads!r} is not allowed; it takes a whole number >= 1")
+        check_argument("threads", threads, Whole(1))
         self._check(mission, numbers, on_error)
         self.mission, self.n_worlds = mission, len(numbers)
         self.observers: list[Callable[[Simulation], None]] = []
@@ -149,8 +152,11 @@ class Simulation:
         """Advance all running worlds by n steps.
 
         Raises:
+            ParameterError: `n` is not a whole number >= 0.
             PluginError: A plugin failed, and `on_error` does not record it.
         """
+        if n.__class__ is not int or n < 0:
+            check_argument("n", n, Whole())
         for _ in range(n):
             if not self.state.n_running:
                 return
@@ -191,7 +197,12 @@ class Simulation:
 
         Returns:
             The result of each world so far.
+
+        Raises:
+            ParameterError: `until` is not a number.
+            PluginError: As `step`.
         """
+        check_argument("until", until, Maybe(Real(-math.inf, math.inf)))
         state, end = self.state, self.mission.end if until is None else until
         with notebook_bar(self.mission.name) as show:
             while state.n_running:
@@ -244,11 +255,7 @@ class Simulation:
             ParameterError: A world does not exist or is given twice, or a seed or parameter is not allowed.
             MissionError: Re-keys are not in order of their steps, or a number is not allowed.
         """
-        numbers = [int(w) for w in worlds]
-        if len(set(numbers)) < len(numbers) or not all(0 <= w < self.n_worlds for w in numbers):
-            raise ParameterError(
-                f"reset: worlds = {numbers} is not allowed; it takes numbers from 0 to {self.n_worlds - 1}, each once"
-            )
+        numbers = self._world_numbers("reset", worlds, ", each once")
         if seeds is not None:
             _check_seeds(seeds)
             if len(seeds) != len(numbers):
@@ -307,20 +314,34 @@ class Simulation:
             WiringError: The network does not exist, or the topic has another message type.
         """
         running, message_bus = self.state.running, self.state.message_bus
-        chosen = np.flatnonzero(running) if worlds is None else np.array(list(worlds), np.int64)
-        if len(chosen) and (chosen.min() < 0 or chosen.max() >= self.n_worlds):
-            raise ParameterError(
-                f"publish: worlds = {chosen.tolist()} is not allowed; it takes numbers from 0 to {self.n_worlds - 1}"
-            )
+        if worlds is None:
+            chosen = np.flatnonzero(running)
+        else:
+            chosen = np.array(self._world_numbers("publish", worlds), np.int64)
+        ids = _whole_numbers("publish: receivers", receivers, "a list of ids")
         batch = Messages.make(type_, chosen, np.zeros(len(chosen), np.int64), fields)
         buffer = message_bus.topic(network, topic or type_.__name__, type_, "publish")
-        sent, ids = batch.take(np.flatnonzero(running[chosen])), tuple(map(int, receivers))
+        sent = batch.take(np.flatnonzero(running[chosen]))
         if ids:
             order(self.state, buffer, sent, ids)
         else:
             buffer.add(sent)
         for number, world in enumerate(sent.world.tolist()) if self._is_told else ():
             self._tell(world, of_message(sent, number, self._step_of(world), network, topic, ids))
+
+    def _check_world(self, where: str, world: int) -> None:
+        if not (_is_whole(world) and 0 <= world < self.n_worlds):
+            raise ParameterError(
+                f"{where}: world = {world!r} is not allowed; there are worlds 0 to {self.n_worlds - 1}"
+            )
+
+    def _world_numbers(self, where: str, worlds: Iterable[int], each: str = "") -> list[int]:
+        """Return numbers of worlds as a list, checked; with `each`, none may be there twice."""
+        allowed = f"a list of numbers from 0 to {self.n_worlds - 1}{each}"
+        found = _whole_numbers(f"{where}: worlds", worlds, allowed)
+        if not all(0 <= w < self.n_worlds for w in found) or (each and len(set(found)) < len(found)):
+            raise ParameterError(f"{where}: worlds = {list(found)} is not allowed; it takes {allowed}")
+        return list(found)
 
     @property
     def _is_told(self) -> bool:
@@ -343,10 +364,7 @@ class Simulation:
         Raises:
             ParameterError: There is no such world, or an input cannot be repeated because a message held an object.
         """
-        if not 0 <= world < self.n_worlds:
-            raise ParameterError(
-                f"play_inputs: world = {world!r} is not allowed; there are worlds 0 to {self.n_worlds - 1}"
-            )
+        self._check_world("play_inputs", world)
         by_step: dict[int, list[ExternalInput]] = {}
         for each in inputs:
             if each.values is None:
@@ -364,6 +382,7 @@ class Simulation:
             ParameterError: There is no such column or message, or its values do not fit.
             WiringError: There is no such network.
         """
+        self._check_world("play_input", world)
         with given_by(given.by):
             if given.kind == COLUMN:
                 access.write(self.state, given.name, np.array(given.values), world)
@@ -408,7 +427,12 @@ class Simulation:
         ]
 
     def state_hash(self, world: int = 0) -> str:
-        """Hash of all columns of one world. Equal states have equal hashes; different states have different ones."""
+        """Hash of all columns of one world. Equal states have equal hashes; different states have different ones.
+
+        Raises:
+            ParameterError: There is no such world.
+        """
+        self._check_world("state_hash", world)
         result, state = self.state.results[world], self.state
         return (
             result.state_hash if result is not None and not state.running[world] else state_hash(state, world)
@@ -497,7 +521,24 @@ class Simulation:
             self.close()
 
 
+def _is_whole(value: Any) -> bool:
+    return isinstance(value, (int, np.integer)) and not isinstance(value, bool)
+
+
+def _whole_numbers(where: str, given: Any, allowed: str) -> tuple[int, ...]:
+    found = (
+        given.tolist()
+        if isinstance(given, np.ndarray)
+        else list(given)
+        if isinstance(given, Iterable)
+        else None
+    )
+    if not isinstance(found, list) or not all(map(_is_whole, found)):
+        raise ParameterError(f"{where} = {given!r:.60} is not allowed; it takes {allowed}")
+    return tuple(map(int, found))
+
+
 def _check_seeds(seeds: Iterable[Any]) -> None:
     for seed in seeds:
-        if isinstance(seed, bool) or not isinstance(seed, (int, np.integer)):
-            raise ParameterError(f"seed {seed!r} is not allowed; it takes a whole number")
+        if not (_is_whole(seed) and 0 <= seed <= MAX_SEED):
+            raise ParameterError(f"seed {seed!r} is not allowed; it takes a whole number from 0 to 2^64 - 1")

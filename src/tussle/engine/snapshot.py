@@ -82,6 +82,8 @@ def _save_handles(binding: Binding) -> dict[str, list[bytes]]:
 
 def restore(state: SimulationState, saved: Snapshot) -> None:
     """See `Simulation.restore`."""
+    if not isinstance(saved, Snapshot):
+        raise SnapshotError(f"restore takes what `snapshot` returned, not {saved!r:.60}")
     if saved.mission != state.mission or len(saved.seeds) != state.n_worlds:
         raise SnapshotError(
             f"the snapshot has {len(saved.seeds)} worlds of mission {saved.mission.name!r}, the simulation {state.n_worlds} of mission "

@@ -102,7 +102,7 @@ class SimulationState:
         self.manual: dict[tuple[int, int], tuple[float, ...]] = {}
         self.has_failures, self.has_changed, self.by_substep = False, True, False
         clock = Clock(n, mission.start, mission.dt)
-        keys = np.array([s % 2**64 for s in seeds], np.uint64)
+        keys = np.array(seeds, np.uint64)
         blocks = [b.name for b in mission.blocks]
         context = Context(clock, keys, blocks, mission.scene, mission.teams, self.running, threads=threads)
         self.context = context
