@@ -77,6 +77,8 @@ def writer(name: str, column: Column) -> Write | None:
         return _write_reference
     if not isinstance(column, (State, Output)) or (isinstance(column, State) and column.per == "team"):
         return None
+    if column.dtype is int and not is_list(column):
+        return _write_wholes if column.fields else _write_whole
     return _write_several if column.fields or is_list(column) else write_number
 
 
@@ -86,9 +88,32 @@ def write_number(of: Any, name: str, value: Any) -> None:
         of._cells[name][of._row] = value
     except (TypeError, ValueError):
         try:
-            of._own[name][of._row] = value  # NumPy converts a float to an integer, a memory view does not
+            of._own[name][of._row] = value
         except (TypeError, ValueError):
             raise _wrong_value(of, name, value, "a number") from None
+
+
+def are_whole(value: Any) -> bool:
+    """Whether a value, or each of several, is a whole number of 64 bits."""
+    given = np.asarray(value)
+    if given.dtype.kind == "f":
+        return bool((given == np.floor(given)).all() and (np.abs(given) < 2.0**63).all())
+    return given.dtype.kind in "bi" or (given.dtype.kind == "u" and bool((given < 2**63).all()))
+
+
+def _write_whole(of: Any, name: str, value: Any) -> None:
+    """Setter of a column of one whole number."""
+    try:
+        of._cells[name][of._row] = value
+    except (TypeError, ValueError):
+        _write_wholes(of, name, value)
+
+
+def _write_wholes(of: Any, name: str, value: Any) -> None:
+    """Setter of a column of whole numbers."""
+    if not are_whole(value):
+        raise _wrong_value(of, name, value, "whole numbers")
+    _write_several(of, name, value)
 
 
 def _write_several(of: Any, name: str, value: Any) -> None:
@@ -96,12 +121,13 @@ def _write_several(of: Any, name: str, value: Any) -> None:
         of._own[name][..., of._row] = value
     except (TypeError, ValueError):
         fields = type(of._shared.plugin).columns[name].fields
-        raise _wrong_value(of, name, value, f"{len(fields)} numbers ({', '.join(fields)})") from None
+        wanted = f"{len(fields)} numbers ({', '.join(fields)})" if fields else "a whole number"
+        raise _wrong_value(of, name, value, wanted) from None
 
 
 def _wrong_value(of: Any, name: str, value: Any, wanted: str) -> ParameterError:
     shape = np.shape(value) if isinstance(value, (np.ndarray, list, tuple)) else ()
-    given = f"of shape {shape}" if shape else repr(value)
+    given = f"of shape {shape}" if shape else f"{value!r:.60}"
     return ParameterError(f"{type(of._shared.plugin).__name__}.{name} takes {wanted}, not {given}")
 
 
@@ -181,6 +207,8 @@ class PerTeam(MutableMapping[int, Any]):
         return self._values.item(self._place(team))
 
     def __setitem__(self, team: int, value: Any) -> None:
+        if self._values.dtype.kind == "i" and not are_whole(value):
+            raise ParameterError(f"{self._name} takes whole numbers, not {value!r:.60}")
         self._values[self._place(team)] = value
 
     def __delitem__(self, team: int) -> None:
