@@ -39,6 +39,9 @@ KEPT_INDEXES = 32
 BRUTE = 600
 """Rows per world up to which a nearest-neighbour search is fast without cells."""
 
+MAX_LENGTH_ERROR = 1e-3
+"""Difference from 1 up to which the length of a given quaternion counts as rounded."""
+
 _DERIVING = {name: getattr(kernels, name) for name in DERIVED}
 OFFSETS = {name: sum(list(FLOATS.values())[:i]) for i, name in enumerate(FLOATS)}
 _COLUMNS = {
@@ -51,6 +54,23 @@ BODY_UNITS = {
     "pos": "m", "vel": "m/s", "quat": "", "omega": "rad/s", "force": "N", "torque": "N m", "health": "", "radius": "m",
     "mass": "kg", "yaw": "rad", "climb": "rad", "roll": "rad", "forward": "", "level_forward": "",
 }  # fmt: skip
+
+
+def problems_of_states(name: str, values: np.ndarray) -> list[tuple[int, str]]:
+    """Items of states given for bodies, (k, m), that are no states, each with what is wrong."""
+    found = [
+        (int(item), f"{name} is not finite") for item in np.flatnonzero(~np.isfinite(values).all(axis=0))
+    ]
+    if name == "quat":
+        with np.errstate(all="ignore"):
+            length = np.sqrt((values * values).sum(axis=0))
+        found += [
+            (int(item), f"quat has the length {length[item]:.6g}; it takes quaternions of length 1")
+            for item in np.flatnonzero(
+                np.isfinite(values).all(axis=0) & ~(np.abs(length - 1.0) <= MAX_LENGTH_ERROR)
+            )
+        ]
+    return found
 
 
 @dataclass(slots=True)

@@ -7,14 +7,15 @@ from typing import Any
 
 import numpy as np
 
-from tussle.api.bodies import IN_PLACE, Bodies, BodyView
+from tussle.api.bodies import IN_PLACE, Bodies, BodyView, problems_of_states
 from tussle.api.context import Context, stream
 from tussle.api.group import GOLDEN, LAWS, GroupView
 from tussle.api.mass import MassProperties
 from tussle.declare.comms import TopicBuffer
 from tussle.declare.messages import Message, Messages
-from tussle.errors import MissionError, ParameterError, listed, nearest_name
+from tussle.errors import MissionError, ParameterError, PluginError, listed, nearest_name
 from tussle.numeric import rng
+from tussle.numeric.arrays import numbers_below
 
 
 class WorldBodies(BodyView):
@@ -104,8 +105,11 @@ class WorldView(GroupView):
         Returns:
             Whether each of them is removed by this call and not by an earlier one in this step: (m,), or for a mask (n,). Of a row that
             is given twice, the first counts.
+
+        Raises:
+            ParameterError: There is no such row; -1, which `rows_of` returns for removed entities, is none.
         """
-        given, rows = np.atleast_1d(np.asarray(rows)), self._rows(rows)
+        given, rows = np.atleast_1d(np.asarray(rows)), self._rows("kill", rows)
         is_new = np.zeros(len(rows), bool)
         is_new[np.unique(rows, return_index=True)[1]] = True
         for before, _ in self.deaths:
@@ -129,9 +133,13 @@ class WorldView(GroupView):
     ) -> None:
         """Set pos [m] (3, m), vel [m/s] (3, m), quat (4, m) or omega [rad/s] (3, m) of entities.
 
-        Their motion models continue from the new state. Where it is not finite, the world ends with an error.
+        Their motion models continue from the new state. Where it is not finite, or a quaternion has not the length 1, the world ends
+        with an error.
+
+        Raises:
+            ParameterError: There is no such row, or an array has another shape.
         """
-        rows = self._rows(rows)
+        rows = self._rows("move", rows)
         if not len(rows):
             return
         for name, given, k in (("pos", pos, 3), ("vel", vel, 3), ("quat", quat, 4), ("omega", omega, 3)):
@@ -143,10 +151,8 @@ class WorldView(GroupView):
                         f"w.move: {name} has shape {value.shape}; it takes ({k}, {len(rows)})"
                     )
                 getattr(self._bodies, name)[:, rows] = value
-                is_sound = np.isfinite(value).all(axis=0)
-                if not is_sound.all():
-                    for row in rows[~np.broadcast_to(is_sound, len(rows))]:
-                        self.fail(row, f"w.move: {name} is not finite")
+                for item, text in problems_of_states(name, np.broadcast_to(value, (k, len(rows)))):
+                    self.fail(rows[item], f"w.move: {text}")
         if self._bodies.scans:
             for row in rows:
                 self._bodies.touch(int(row), int(row) + 1)
@@ -169,19 +175,32 @@ class WorldView(GroupView):
         Args:
             block: Name of the entity block used as template.
             world: World of each entity, (m,).
-            **where: pos [m] (3, m), vel [m/s] (3, m), quat (4, m), team (m,); the block's values by default.
+            **where: pos [m] (3, m), vel [m/s] (3, m), quat (4, m), team (m,); the block's values by default. Where they are not finite,
+                or a quaternion has not the length 1, the world ends with an error.
+
+        Raises:
+            MissionError: There is no such block.
+            ParameterError: There is no such world, or an array has another name or shape.
         """
         if block not in self.templates:
             raise MissionError(
                 f"w.spawn: there is no block {block!r}{nearest_name(block, self.templates)}; {listed(self.templates)}"
             )
-        world = np.atleast_1d(np.asarray(world, np.int64))
+        world = numbers_below(self.n_worlds, world, "w.spawn: world")
         full = {name: self._per_birth(name, value, len(world)) for name, value in where.items()}
         kept = self._indices_acted_on(world)
+        for name, values in full.items():
+            for item, text in problems_of_states(name, values):
+                if item in kept:
+                    self._fail_world(int(world[item]), f"w.spawn: {text}")
         if len(kept):
             self.births.append(
                 {"block": block, "world": world[kept], **{k: v[..., kept] for k, v in full.items()}}
             )
+
+    def _fail_world(self, world: int, why: str) -> None:
+        step, plugin = int(self.context.clock.step[world]), self._caller.instance_name
+        self.context.fail(world, PluginError(why, step=step, world=world, plugin=plugin))
 
     def _per_birth(self, name: str, value: Any, m: int) -> np.ndarray:
         allowed = {"pos": (3,), "vel": (3,), "quat": (4,), "team": ()}
@@ -210,9 +229,8 @@ class WorldView(GroupView):
         """Indices of the items of `world`, (m,), that are worlds this call acts on."""
         return np.arange(len(world)) if self.only is None else np.flatnonzero(self.only[world])
 
-    def _rows(self, rows: Any) -> np.ndarray:
-        rows = np.atleast_1d(np.asarray(rows))
-        return np.flatnonzero(rows) if rows.dtype == bool else rows.astype(np.int64)
+    def _rows(self, what: str, rows: Any) -> np.ndarray:
+        return numbers_below(self.n, rows, f"w.{what}: rows", ", as of a removed entity,")
 
     # -- messages ---------------------------------------------------------------------------------------------------------
 
@@ -224,8 +242,12 @@ class WorldView(GroupView):
         return topics[0].outbox() if len(topics) == 1 else Messages.concatenate([t.outbox() for t in topics])
 
     def publish(self, type_: type[Message], world: Any, network: str = "", **fields: Any) -> None:
-        """Publish one message per item of `world` with the world as sender (sender 0)."""
-        world = np.atleast_1d(np.asarray(world, np.int64))
+        """Publish one message per item of `world` with the world as sender (sender 0).
+
+        Raises:
+            ParameterError: There is no such world or field, or a field has another shape.
+        """
+        world = numbers_below(self.n_worlds, world, "w.publish: world")
         if len(world):
             batch = Messages.make(type_, world, np.zeros(len(world), np.int64), fields)
             self.publish_to(type_, network).add(

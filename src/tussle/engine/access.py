@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from tussle.api.bodies import BODY_UNITS, DERIVED, FLOATS, INTS, Bodies, derived_from
+from tussle.api.bodies import BODY_UNITS, DERIVED, FLOATS, INTS, Bodies, derived_from, problems_of_states
 from tussle.api.plugin import Plugin
 from tussle.declare.columns import Numbers, Param, State
 from tussle.engine.group import Binding, Group
@@ -204,6 +204,17 @@ def _check_written(path: str, values: np.ndarray, column: Numbers, is_body: bool
         raise ParameterError(f"{path!r}: values hold NaN")
     if is_body and not path.endswith(".health") and not np.isfinite(values).all():
         raise ParameterError(f"{path!r}: values must be finite")
+    if is_body:
+        for _, text in (
+            problems_of_states(path.rpartition(".")[2], np.atleast_2d(values))
+            if path.endswith(".quat")
+            else ()
+        ):
+            raise ParameterError(f"{path!r}: {text}")
+        if path.endswith((".mass", ".radius")) and not (np.asarray(values) > 0.0).all():
+            raise ParameterError(f"{path!r}: values must be > 0")
+    if column.dtype is bool and not np.isin(values, (0, 1)).all():
+        raise ParameterError(f"{path!r}: values must be true or false")
     if column.dtype is int:
         with np.errstate(invalid="ignore"):
             if (np.asarray(values).astype(np.int64) != values).any():

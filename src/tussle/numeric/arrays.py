@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tussle.errors import ParameterError
 from tussle.numeric.kernel import kernel
 
 Floats = NDArray[np.float64]
@@ -52,3 +53,26 @@ def matmul(w: ArrayLike, x: ArrayLike) -> Floats:
     out = np.empty((left.shape[0], right.shape[1]))
     matmul_columns(left, right, out)
     return out
+
+
+def numbers_below(n: int, given: ArrayLike, where: str, hint: str = "") -> NDArray[np.int64]:
+    """Return numbers from 0 to n - 1, (m,), given as one, several, or a mask (n,).
+
+    Raises:
+        ParameterError: There is another number, or the mask has another shape; `where` and `hint` are parts of the message.
+    """
+    array = np.atleast_1d(np.asarray(given))
+    if array.dtype == bool and array.shape == (n,):
+        return np.flatnonzero(array)
+    if not array.size and array.ndim == 1:
+        return np.zeros(0, np.int64)
+    if array.dtype.kind not in "iu" or array.ndim != 1:
+        kind = f"an array of {array.dtype}, {array.shape}"
+    elif 0 <= array.min() and array.max() < n:
+        return array.astype(np.int64)
+    else:
+        wrong = array[(array < 0) | (array >= n)][0]
+        kind = f"{wrong}{hint if wrong == -1 else ''}"
+    raise ParameterError(
+        f"{where} = {kind} is not allowed; it takes whole numbers from 0 to {n - 1}, or a mask ({n},)"
+    )

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 from small_worlds import Drift, Note, block, mission
@@ -283,11 +285,31 @@ def test_one_without_a_step_is_left_out():
     assert sim.result()[0].metrics == {"AtTheEnd": {"n": 4}}
 
 
+def test_an_entity_is_one_of_this_world_and_of_this_call():
+    kept = {}
+
+    def of_the_first(self, w):
+        kept.setdefault(0, w.entities[0])
+        w.kill(kept[0], "x")
+
+    def of_the_step_before(self, w):
+        kept.setdefault(w.seed, w.entities[0])
+        w.move(kept[w.seed], pos=(1.0, 2.0, 3.0))
+
+    for step, text in (
+        (of_the_first, r"w.kill: the entity 1 was found in another world; keep its id, and find it again with w.entity\(1\)"),
+        (of_the_step_before, r"w.move: the entity 1 was found in another call"),
+    ):  # fmt: skip
+        with pytest.raises(PluginError, match=text):
+            played(referee(step)(), seeds=[1, 2], steps=2)
+
+
 # -- errors -----------------------------------------------------------------------------------------------------------------------
 
 COLUMNS = {
     "reach": Param(1.0),
     "n": State(dtype=int, per="world"),
+    "pair": State("a b", dtype=int, per="world"),
     "lost": State(dtype=int, per="team"),
     "age": State(),
 }
@@ -304,7 +326,20 @@ COLUMNS = {
         (lambda self, w: setattr(w, "t", 1.0), "Judge: w.t is read-only"),
         (lambda self, w: setattr(w, "lost", 1), "Judge: lost has one value per team"),
         (lambda self, w: setattr(w, "age", 1), "Judge: age has one value per entity"),
-        (lambda self, w: setattr(w, "n", "many"), "Judge.n takes a number, not 'many'"),
+        (lambda self, w: setattr(w, "n", "many"), "Judge.n takes whole numbers, not 'many'"),
+        (lambda self, w: setattr(w, "n", 1.5), "Judge.n takes whole numbers, not 1.5"),
+        (lambda self, w: setattr(w, "n", math.nan), "Judge.n takes whole numbers, not nan"),
+        (lambda self, w: setattr(w, "n", 10**30), "Judge.n takes whole numbers, not 10000"),
+        (lambda self, w: setattr(w, "n", 1e30), "Judge.n takes whole numbers, not 1e+30"),
+        (lambda self, w: setattr(w, "pair", (1, 2.5)), "Judge.pair takes whole numbers, not of shape (2,)"),
+        (
+            lambda self, w: setattr(w, "pair", (1, 2, 3)),
+            "Judge.pair takes 2 numbers (a, b), not of shape (3,)",
+        ),
+        (lambda self, w: w.lost.__setitem__(1, 0.5), "w.lost takes whole numbers, not 0.5"),
+        (lambda self, w: w.spawn("a", pos=(0.0, math.nan, 0.0)), "w.spawn: pos is not finite"),
+        (lambda self, w: w.spawn("a", quat=(2.0, 0.0, 0.0, 0.0)), "w.spawn: quat has the length 2; it takes"),
+        (lambda self, w: w.move(w.entities[0], quat=(0.0,) * 4), "w.move: quat has the length 0; it takes"),
         (lambda self, w: w.lost[9], "w.lost: there is no team 9; there are: 1, 2"),
         (lambda self, w: w.distance(w.entities[0], None), "distance takes two entities"),
         (lambda self, w: w.lost.pop(1), "w.lost has one value per team"),

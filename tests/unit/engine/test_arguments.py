@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from tussle import Block, Mission, Simulation
-from tussle.errors import TussleError
+from tussle.api import Autonomy, State
+from tussle.errors import ParameterError, TussleError
 from tussle.messages import Waypoint
 from tussle.stock import Still
 
@@ -75,3 +76,29 @@ def test_numbers_of_numpy_are_numbers(simulation):
     assert simulation.state_hash(np.int64(1)) == simulation.state_hash(1)
     assert [each.seed for each in simulation.result()] == [2**64 - 1, 2, 5]
     assert simulation.steps.tolist() == [0, 3, 0]
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "text"),
+    [
+        ("a.quat", (0.0, 0.0, 0.0, 0.0), "'a.quat': quat has the length 0; it takes quaternions of length 1"),
+        ("a.quat", (1e200, 0.0, 0.0, 0.0), "quat has the length inf"),
+        ("a.quat", (1.0, 1.0, 0.0, 0.0), "quat has the length 1.41421"),
+        ("a.mass", 0.0, "'a.mass': values must be > 0"),
+        ("a.radius", -1.0, "'a.radius': values must be > 0"),
+        ("a.Marks.on", 2.5, "'a.Marks.on': values must be true or false"),
+        ("a.Marks.on", [1, 7], "'a.Marks.on': values must be true or false"),
+    ],
+)
+def test_what_a_column_cannot_hold_is_not_written(path, value, text):
+    class Marks(Autonomy):
+        on = State(dtype=bool)
+
+        def step(self, g):
+            pass
+
+    with Simulation(Mission(blocks=[Block(name="a", count=2, autonomy=Marks(), motion=Still())])) as made:
+        before = made.state_hash()
+        with pytest.raises(ParameterError, match=re.escape(text)):
+            made.write(path, value)
+        assert made.state_hash() == before

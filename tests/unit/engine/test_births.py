@@ -9,7 +9,7 @@ from small_worlds import Drift, Reaper, Wander, alone, block, hashes, mission
 from tussle import Simulation
 from tussle.api import Autonomy, Interaction, Metric, Param, Publish, State
 from tussle.errors import MissionError, ParameterError, PluginError, TussleError
-from tussle.messages import SpawnEntity
+from tussle.messages import SpawnEntity, Waypoint
 from tussle.stock import SimpleCollision, SingleIntegrator
 
 
@@ -358,6 +358,31 @@ def test_w_spawn_takes_one_place_for_all_or_one_each():
         (lambda w: w.spawn("child", [0], team=7), r"w.spawn: team = 7 is not allowed"),
         (lambda w: w.spawn("child", [0], pos=(1, 2)), r"w.spawn: pos has shape \(2,\); it takes \(3, 1\)"),
         (lambda w: w.move([0], pos=(1, 2)), r"w.move: pos has shape \(2, 1\); it takes \(3, 1\)"),
+        (
+            lambda w: w.spawn("child", [1]),
+            r"w.spawn: world = 1 is not allowed; it takes whole numbers from 0 to 0",
+        ),
+        (lambda w: w.spawn("child", 0.5), r"w.spawn: world = an array of float64, \(1,\) is not allowed"),
+        (lambda w: w.spawn("child", [0], pos=(1, 2, np.inf)), r"w.spawn: pos is not finite"),
+        (
+            lambda w: w.spawn("child", [0], quat=(1, 1, 0, 0)),
+            r"w.spawn: quat has the length 1.41421; it takes quaternions of length 1",
+        ),
+        (lambda w: w.move([0], quat=(0, 0, 0, 0)), r"w.move: quat has the length 0; it takes"),
+        (
+            lambda w: w.move([7], vel=(1, 2, 3)),
+            r"w.move: rows = 7 is not allowed; it takes whole numbers from 0 to \d",
+        ),
+        (
+            lambda w: w.kill(w.rows_of(w.id * 9), "x"),
+            r"w.kill: rows = -1, as of a removed entity, is not allowed",
+        ),
+        (lambda w: w.kill([[0]], "x"), r"w.kill: rows = an array of int64, \(1, 1\) is not allowed"),
+        (
+            lambda w: w.kill(np.ones(99, bool), "x"),
+            r"w.kill: rows = an array of bool, \(99,\) is not allowed; it .*, or a mask \(\d+,\)",
+        ),
+        (lambda w: w.publish(Waypoint, [-1], pos=(1, 2, 3)), r"w.publish: world = -1 is not allowed"),
     ],
 )
 def test_wrong_wishes_are_refused(call, message):

@@ -197,6 +197,11 @@ class OneWorld:
             raise ParameterError(
                 f"w.{what} takes an entity from w.entities or from a message, not {entity!r}"
             )
+        if entity._shared is not self._shared or self._shared.g.world[entity._row] != self._row:
+            raise ParameterError(
+                f"w.{what}: the entity {entity._id} was found in another {'world' if entity._shared is self._shared else 'call'}; "
+                f"keep its id, and find it again with w.entity({entity._id})"
+            )
         return np.array([entity._row])
 
     def spawn(self, block: str, **where: Any) -> None:

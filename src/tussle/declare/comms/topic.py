@@ -9,6 +9,7 @@ from typing import Any, Final
 import numpy as np
 
 from tussle.declare.messages import Message, Messages
+from tussle.numeric.arrays import numbers_below
 from tussle.numeric.segments import order_by_row
 
 EVERYONE: Final = "everyone"
@@ -268,10 +269,13 @@ class Publisher:
         self.view = view
 
     def publish(self, rows: Any, **fields: Any) -> None:
-        """Send one message from each of `rows`; fields are scalars, (n,) or (k, n)."""
-        rows = np.atleast_1d(np.asarray(rows))
-        rows = np.flatnonzero(rows) if rows.dtype == bool else rows
+        """Send one message from each of `rows`, (n,), or of a mask of all rows; fields are scalars, (n,) or (k, n).
+
+        Raises:
+            ParameterError: There is no such row or field, or a field has another shape.
+        """
+        view = self.view
+        rows = numbers_below(view.n, rows, "publish: rows")
         if len(rows):
-            view = self.view
             view._differs("publishes before `finish`")
             self.topic.add(Messages.make(self.topic.type, view.world[rows], view.id[rows], fields))
