@@ -93,7 +93,7 @@ def recording(locked: Sequence[np.ndarray] = ()) -> Iterator[KernelCalls]:
         return
     before = len(ready), stats.interpreted
     try:
-        Kernel.__call__ = first_call  # type: ignore[method-assign]
+        Kernel.__call__ = first_call  # type: ignore[method-assign, assignment]
         for each in list(ready):
             each.call_by(recorded.listener(each))
         for array in locked:

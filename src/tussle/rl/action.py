@@ -52,7 +52,11 @@ class Act:
         Raises:
             ParameterError: The target does not exist, or the values do not fit together.
         """
-        is_range = self.low is not None and self.high is not None and np.isfinite([self.low, self.high]).all()
+        if not isinstance(self.target, str):
+            raise ParameterError(
+                f"Act: target = {self.target!r} is not allowed; it takes the name of a channel"
+            )
+        is_range = _is_finite(self.low) and _is_finite(self.high)
         given = [is_range and self.low != self.high, self.levels is not None, self.value is not None]
         if sum(given) != 1 or (not is_range and (self.low, self.high) != (None, None)):
             raise ParameterError(
@@ -64,6 +68,11 @@ class Act:
             raise ParameterError(
                 f"Act({self.target!r}): levels are two or more rows of {len(self.names)} number(s)"
             )
+        for value in [self.value] if self.levels is None else np.ravel(self.levels).tolist():
+            if value is not None and not _is_finite(value):
+                raise ParameterError(
+                    f"Act({self.target!r}): {value!r} is not allowed; it takes finite numbers"
+                )
         channels = channels_of(block)
         for name in self.names:
             if "." in name:
@@ -72,6 +81,10 @@ class Act:
                 raise ParameterError(
                     f"Act: {block.name} has no channel {name!r}{nearest_name(name, channels)}; {listed(channels)}"
                 )
+
+
+def _is_finite(value: Any) -> bool:
+    return isinstance(value, (int, float, np.number)) and bool(np.isfinite(value))
 
 
 def channels_of(block: Block) -> dict[str, str]:

@@ -55,9 +55,9 @@ class Computed(Component):
             ParameterError: It returns another shape, or a number that is not finite.
         """
         values, shape = np.asarray(self.function(simulation)), (simulation.n_worlds, self.n)
-        if values.shape != shape or not np.isfinite(values).all():
+        if values.shape != shape or values.dtype.kind not in "biuf" or not np.isfinite(values).all():
             raise ParameterError(
-                f"state: the function returns shape {values.shape}; it returns {shape}, {self.n} finite numbers for each world"
+                f"state: the function returns {_shape_of(values)}; it returns {shape}, {self.n} finite numbers for each world"
             )
         return values
 
@@ -67,9 +67,9 @@ class Computed(Component):
     def write(self, simulation: Simulation, part: AgentRows, column: int, out: np.ndarray) -> None:
         values = np.asarray(self.function(simulation))
         shape = simulation.n_worlds, len(out) // simulation.n_worlds, self.n
-        if values.shape != shape:
+        if values.shape != shape or values.dtype.kind not in "biuf":
             raise ParameterError(
-                f"Computed: the function returns shape {values.shape}; it returns {shape}, {self.n} numbers for each world and agent"
+                f"Computed: the function returns {_shape_of(values)}; it returns {shape}, {self.n} numbers for each world and agent"
             )
         mine = values.reshape(-1, self.n)[part.agents]
         if not np.isfinite(mine).all():
@@ -81,6 +81,10 @@ class Computed(Component):
                 "(`simulation.read` has NaN for the dead)"
             )
         out[part.agents, column : column + self.n] = mine
+
+
+def _shape_of(values: np.ndarray) -> str:
+    return f"shape {values.shape}{'' if values.dtype.kind in 'biuf' else f' of {values.dtype}'}"
 
 
 __all__ = ["Computed"]

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tussle.api.bodies import FLOATS, OFFSETS
+from tussle.documents import Whole, check_argument
 from tussle.errors import ParameterError, listed, nearest_name
 from tussle.numeric.kernel import kernel
 from tussle.numeric.neighbors.index import padded
@@ -331,10 +332,7 @@ class NearestOthers(_Search):
         names = self.columns.split()
         check_features("NearestOthers", self.frame, names, (*RELATIVE, *OTHERS, *FLOATS), self.scale)
         self._check_of(mission, self.radius, False)
-        if self.k < 1:
-            raise ParameterError(
-                f"NearestOthers: k = {self.k!r} is not allowed; it takes a whole number >= 1"
-            )
+        check_argument("NearestOthers: k", self.k, Whole(1))
         return self.k * self._features[1]
 
     def bounds(self, mission: Mission, block: str) -> np.ndarray:
@@ -437,8 +435,7 @@ class Sectors(_Search):
     def width(self, mission: Mission, block: str) -> int:
         check_features("Sectors", self.frame, (), (), 1.0)
         self._check_of(mission, self.radius, True)
-        if self.n < 1:
-            raise ParameterError(f"Sectors: n = {self.n!r} is not allowed; it takes a whole number >= 1")
+        check_argument("Sectors: n", self.n, Whole(1))
         return self.n
 
     def bounds(self, mission: Mission, block: str) -> np.ndarray:

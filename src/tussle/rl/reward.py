@@ -271,14 +271,18 @@ class Term:
     def __post_init__(self) -> None:
         if self.per not in SHARES:
             raise ParameterError(f"Term: per = {self.per!r} is not allowed; {listed(SHARES)}")
-        if not np.isfinite(self.weight):
+        if not callable(self.function):
+            raise ParameterError(
+                f"Term: function = {self.function!r} is not allowed; it takes a function of a Situation"
+            )
+        if not (isinstance(self.weight, (int, float, np.number)) and np.isfinite(self.weight)):
             raise ParameterError(f"Term: weight = {self.weight!r} is not allowed; it takes a finite number")
 
     def write(self, now: Situation, out: np.ndarray) -> None:
         """Write the weighted values to out, (W, A); 0 for agents that were dead before.
 
         Raises:
-            ParameterError: The values have another shape, or that of an agent is not a finite number.
+            ParameterError: The values have another shape, or are not finite numbers.
         """
         values = np.asarray(self.function(now))
         worlds, agents = out.shape
@@ -286,6 +290,10 @@ class Term:
             raise ParameterError(
                 f"returns shape {values.shape}; it returns ({worlds}, {agents}), a value for each world and agent, or ({worlds}, 1), one "
                 "for each world, such as values[:, None]"
+            )
+        if values.dtype.kind not in "biuf":
+            raise ParameterError(
+                f"returns {values.dtype}, {values.ravel()[0]!r:.40}; it returns finite numbers"
             )
         np.multiply(values, self.weight, out=out, casting="same_kind")
         wrong = int(kernels.SETTLE[out.dtype.name](out.reshape(-1), now.was_alive.reshape(-1)))

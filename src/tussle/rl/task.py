@@ -11,6 +11,7 @@ from typing import Any, ClassVar
 import numpy as np
 from gymnasium import spaces
 
+from tussle.documents import Whole, check_argument
 from tussle.errors import ParameterError, listed, nearest_name
 from tussle.mission import Block, Mission, mission_of
 from tussle.rl.action import Act, Decoder, learned
@@ -21,6 +22,14 @@ from tussle.rl.reward import Situation, Term
 
 TIMELESS = 1e9
 """End of the mission that is simulated [s]; episodes are ended by the task."""
+KINDS = (
+    ("learners", str, "names of blocks, as 'prey' or 'keepers switchers'"),
+    ("reward", Mapping, "terms by name"),
+    ("policies", Mapping, "names of policies by block"),
+    ("room", Mapping, "numbers of agents by block"),
+    ("overrides", Mapping, "values by path"),
+)
+"""Attributes of a task with their types, and what to call these."""
 
 
 class Task:
@@ -109,11 +118,13 @@ class Task:
 
     def _check(self) -> None:
         where = type(self).__name__
-        if self.decide_every < 1 or int(self.decide_every) != self.decide_every:
-            raise ParameterError(
-                f"{where}: decide_every = {self.decide_every!r} is not allowed; it takes a whole number >= 1"
-            )
-        if self.time_limit is not None and not self.time_limit > 0.0:
+        for name, kind, allowed in KINDS:
+            value = getattr(self, name)
+            if not isinstance(value, kind):
+                raise ParameterError(f"{where}: {name} = {value!r:.80} is not allowed; it takes {allowed}")
+        check_argument(f"{where}: decide_every", self.decide_every, Whole(1))
+        limit = self.time_limit
+        if limit is not None and not (isinstance(limit, (int, float, np.number)) and limit > 0.0):
             raise ParameterError(
                 f"{where}: time_limit = {self.time_limit!r} is not allowed; it takes a number of seconds > 0"
             )
@@ -126,11 +137,13 @@ class Task:
                 raise ParameterError(f"{where}: reward {name!r}: the name of a term does not begin with _")
         _ = self.widths
         known = [b.name for b in self.blocks]
-        for name in self.policies:
-            if name not in known:
-                raise ParameterError(
-                    f"{where}: policies: there is no block {name!r}{nearest_name(name, known)}; {listed(known)}"
-                )
+        for attribute, rule in (("policies", str), ("room", Whole())):
+            for name, value in getattr(self, attribute).items():
+                if name not in known:
+                    raise ParameterError(
+                        f"{where}: {attribute}: there is no block {name!r}{nearest_name(str(name), known)}; {listed(known)}"
+                    )
+                check_argument(f"{where}: {attribute} of {name!r}", value, rule)
         if self.state is not None:
             if not isinstance(self.state, Computed):
                 raise ParameterError(f"{where}: state is {self.state!r:.80}, not a Computed")

@@ -440,6 +440,11 @@ def test_rewards_that_are_no_numbers_are_refused(task):
         play()
     with pytest.raises(ParameterError, match="reward 'far' is inf for agent 0"):
         stepped(task.replace(reward={"far": Term(lambda now: np.full((6, 6), np.inf))}))
+    for values in (None, "much", 1j, np.full((6, 6), None), np.full((6, 6), "a")):
+        with pytest.raises(
+            ParameterError, match=r"Flee: reward 'odd' returns \S+, .*; it returns finite numbers"
+        ):
+            stepped(task.replace(reward={"odd": Term(lambda now, values=values: values)}))
 
 
 def test_values_of_the_dead_do_not_matter(task):
@@ -470,12 +475,14 @@ def test_ends_are_truth_values(task, ends):
         lambda simulation: np.zeros((4, 8)),
         lambda simulation: np.zeros((8, 4, 1)),
         lambda simulation: 0.0,
+        lambda simulation: np.full((4, 8, 1), "a"),
+        lambda simulation: np.full((4, 8, 1), None),
     ],
 )
 def test_an_observation_has_a_row_for_each_agent(function):
     swarm = make_swarm(Crowd(observation=(Computed(1, function),)), 4)
     with pytest.raises(
-        ParameterError, match=r"Computed: the function returns shape \(.*\); it returns \(4, 8, 1\)"
+        ParameterError, match=r"Computed: the function returns shape \(.*\)( of \S+)?; it returns \(4, 8, 1\)"
     ):
         swarm.reset(seed=1)
 

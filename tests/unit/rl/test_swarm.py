@@ -228,11 +228,47 @@ def test_memory_is_flat_over_many_resets(task):
         ({"reward": {"alive": 1.0}}, "not a Term"),
         ({"decide_every": 0}, "decide_every = 0"),
         ({"frame_skip": 2}, "no 'frame_skip'"),
+        ({"decide_every": "2"}, "decide_every = '2' is not allowed; it takes a whole number >= 1"),
+        ({"time_limit": "60 s"}, "time_limit = '60 s' is not allowed; it takes a number of seconds > 0"),
+        ({"learners": ["prey"]}, r"learners = \['prey'\] is not allowed; it takes names of blocks"),
+        ({"reward": None}, "reward = None is not allowed; it takes terms by name"),
+        ({"room": 20}, "room = 20 is not allowed; it takes numbers of agents by block"),
+        ({"room": {"prey": -1}}, "room of 'prey' = -1 is not allowed; it takes a whole number >= 0"),
+        ({"room": {"pray": 9}}, r"room: there is no block 'pray' \(did you mean 'prey'\?\)"),
+        ({"policies": {"prey": 3}}, "policies of 'prey' = 3 is not allowed; it takes a text"),
+        ({"overrides": ["prey.count=3"]}, "overrides = .* it takes values by path"),
+        ({"observation": [NearestOthers(2.5)]}, "NearestOthers: k = 2.5 is not allowed"),
+        ({"observation": [Sectors("4", 9.0)]}, "Sectors: n = '4' is not allowed"),
+        ({"action": [Act("speed", "0", "9")]}, "give finite low and high that differ"),
+        (
+            {"action": [Act("speed", levels=[1.0, np.nan])]},
+            r"Act\('speed'\): nan is not allowed; it takes finite numbers",
+        ),
+        ({"action": [Act("speed", levels=["a", "b"])]}, r"Act\('speed'\): 'a' is not allowed"),
+        (
+            {"action": [Act("speed", value=np.inf), Act("turn_rate", 0, 1)]},
+            r"Act\('speed'\): inf is not allowed",
+        ),
+        ({"action": [Act(3, 0, 1)]}, "Act: target = 3 is not allowed; it takes the name of a channel"),
     ],
 )
 def test_wrong_declarations_are_refused(task, values, message):
     with pytest.raises(ParameterError, match=message):
         make_swarm(task.replace(**values))
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ((3,), "Term: function = 3 is not allowed; it takes a function"),
+        ((abs, "1"), "Term: weight = '1' is not allowed; it takes a finite number"),
+        ((abs, None), "Term: weight = None is not allowed"),
+        ((abs, np.nan), "Term: weight = nan is not allowed"),
+    ],
+)
+def test_wrong_terms_are_refused(values, message):
+    with pytest.raises(ParameterError, match=message):
+        Term(*values)
 
 
 def test_tasks_end_by_their_own_rule(task):
