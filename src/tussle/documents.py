@@ -9,7 +9,7 @@ import stat
 import sys
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from pathlib import Path, PurePosixPath
+from pathlib import Path, PurePath, PurePosixPath
 from typing import Any
 
 from tussle.checksums import BLANK, MARK, is_intact, sealed
@@ -182,6 +182,11 @@ def problem(value: Any, rule: Rule, where: str = "") -> str:
         case Checked():
             return problem(value, rule.rule, where) or rule.problem(value, where)
     return _scalar_problem(value, rule, where)
+
+
+def several(given: Iterable[Any]) -> tuple[Any, ...]:
+    """Items of an argument that takes several texts or paths; a text or path alone is one."""
+    return (given,) if isinstance(given, (str, PurePath)) else tuple(given)
 
 
 def check_argument(name: str, value: Any, rule: Rule) -> None:

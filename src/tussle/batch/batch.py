@@ -34,7 +34,7 @@ from tussle.batch.tasks import BatchRun, Finished
 from tussle.batch.variables import Variable
 from tussle.batch.varied import as_variables, variable_entry
 from tussle.declare.displays import counted, line, listing, page, table
-from tussle.documents import POSITIVE, Maybe, check_argument
+from tussle.documents import POSITIVE, Maybe, check_argument, several
 from tussle.engine.simulation import Simulation
 from tussle.errors import BatchError, ParameterError, PluginError
 from tussle.mission import Loaded, Mission, PluginFile, read_mission
@@ -114,11 +114,12 @@ class Batch:
         check_argument("run_timeout", run_timeout, Maybe(POSITIVE))
         self.source = mission
         self.settings = dict(settings or {})
+        plugin_files = several(plugin_files)
         self.plugin_files = tuple(PluginFile.of(p) for p in plugin_files)
         for file in self.plugin_files:
             file.load()
         self.variables = as_variables(vary)
-        self.reading = {**options, "plugin_files": tuple(plugin_files)}
+        self.reading = {**options, "plugin_files": plugin_files}
         if isinstance(mission, (str, Path)):
             self.variables = with_whole_numbers(mission, self.settings, self.variables, **self.reading)
         self.sample, self.sample_seed = sample, sample_seed

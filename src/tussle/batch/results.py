@@ -42,6 +42,7 @@ from tussle.batch.target import Answers, Layout, Target, answers_of, crossing_of
 from tussle.batch.variables import Variable
 from tussle.batch.varied import variable_of
 from tussle.declare.displays import counted, line, listing, page, table
+from tussle.documents import several
 from tussle.errors import ParameterError, listed
 from tussle.palette import colour_of, on_paper
 from tussle.record.run import check_frames, frame_of, load_run
@@ -273,7 +274,7 @@ class Results:
         """
         rows = self._rows(point)
         blocks, strata = self._blocks(rows, point)
-        chosen = self.defaults.all if expressions is None else expressions
+        chosen = self.defaults.all if expressions is None else several(expressions)
         are_copies = not self._is_blocked(point)
         return [
             mean_of(
@@ -338,6 +339,7 @@ class Results:
         Raises:
             ParameterError: There is no such quantity.
         """
+        expressions = several(expressions)
         return InformativeQuantities({text: self.quantity(text) for text in expressions}, self._varied)(
             expressions
         )

@@ -8,6 +8,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from tussle.batch.variables import Choice, Range, Variable, parse_values, parse_variable
+from tussle.documents import several
 from tussle.errors import ParameterError
 from tussle.mission.codecs import written
 
@@ -23,7 +24,7 @@ def as_variables(vary: Mapping[str, Any] | Iterable[str | Variable]) -> list[Var
     """
     if isinstance(vary, Mapping):
         return [_of(name, value) for name, value in vary.items()]
-    variables = [parse_variable(v) if isinstance(v, str) else v for v in vary]
+    variables = [parse_variable(v) if isinstance(v, str) else v for v in several(vary)]
     for variable in variables:
         if not isinstance(variable, Range | Choice):
             raise ParameterError(

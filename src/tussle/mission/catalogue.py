@@ -13,6 +13,7 @@ from typing import Any
 
 from tussle.api import Autonomy, Behavior, Controller, Interaction, Metric, MotionModel, Network, Sensor
 from tussle.api.plugin import Plugin
+from tussle.documents import several
 from tussle.errors import MissionError, clipped, nearest_name
 from tussle.mission.laws import shipped
 from tussle.mission.plugin_files import PluginFile
@@ -82,7 +83,7 @@ class Catalogue:
         for point in installed():
             place = f"of the package {point.dist.name if point.dist else '?'} ({point.value})"
             self._sources.setdefault(point.name, []).append(PluginSource(place, point.load))
-        for item in plugin_files:
+        for item in several(plugin_files):
             file = item if isinstance(item, PluginFile) else PluginFile.of(item)
             found = file.load()
             for name in found:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from tussle.declare.texts import shown, truth
+from tussle.documents import several
 from tussle.errors import MissionError, ParameterError, TussleError, clipped
 from tussle.mission import codecs
 from tussle.mission.catalogue import KINDS, Catalogue
@@ -120,7 +121,8 @@ def read_mission(
         MissionError: The mission cannot be read or is invalid. The message has one line for each error, with file and line.
     """
     limits = Limits.large() if allow_large else Limits()
-    search = data_folders(search)
+    search = data_folders(several(search))
+    plugin_files = several(plugin_files)
 
     def read(given: Mapping[str, Any]) -> Loaded:
         return _read(source, given, strict, plugin_files, search, limits, compat, plays)

@@ -15,6 +15,7 @@ import numpy as np
 from tussle.batch.batch import Batch
 from tussle.batch.results import Results
 from tussle.batch.statistics import LEVEL, scipy_package
+from tussle.documents import several
 from tussle.errors import MissingExtraError, ParameterError, nearest_name
 from tussle.mission import Mission
 from tussle.mission.plugin_files import load_plugin_file
@@ -150,7 +151,7 @@ class League:
         seed: int = 1,
         plugin_files: Sequence[str | Path] = (),
     ) -> None:
-        for file in plugin_files:
+        for file in several(plugin_files):
             load_plugin_file(file)
         self.name, own = task, registered_task(task, "TASK")
         self.sides = ((task, own), (own.opponents, other_side(task, own)))

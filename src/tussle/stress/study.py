@@ -22,7 +22,7 @@ from tussle.batch.points import settings_of
 from tussle.batch.statistics import wilson
 from tussle.batch.variables import Variable
 from tussle.batch.varied import as_variables, variable_entry
-from tussle.documents import Whole, check_argument
+from tussle.documents import Whole, check_argument, several
 from tussle.engine.simulation import Simulation
 from tussle.errors import BatchError, ParameterError, TussleError
 from tussle.mission import Mission, to_xml
@@ -111,7 +111,7 @@ class Stress:
             if variable.name in given:
                 raise ParameterError(f"{variable.name} is set and varies; say one of the two")
         if isinstance(mission, (str, Path)):
-            reading = {**options, "plugin_files": tuple(plugin_files)}
+            reading = {**options, "plugin_files": several(plugin_files)}
             self.variables = tuple(with_whole_numbers(mission, given, self.variables, **reading))
         self._made: dict[StressGame, Mission] = {}
         self._written: tuple[Path, dict[str, Any]] | None = None  # the result that was written last

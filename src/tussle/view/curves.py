@@ -46,7 +46,7 @@ class GameCurves:
 
     def clear(self) -> None:
         """Forget everything."""
-        self.series: dict[CurveName, StepSeries] = {}
+        self.series: dict[Any, StepSeries] = {}  # also found by the tuple that equals a name
         self._last = -1
         self._who: tuple[np.ndarray, ...] | None = None
         self._is_after_gap = False

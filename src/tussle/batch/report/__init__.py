@@ -9,6 +9,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from tussle.documents import several
 from tussle.errors import MissingExtraError, RecordError
 
 if TYPE_CHECKING:
@@ -62,7 +63,7 @@ def write_report(
     from tussle.batch.report.report_data import ReportData
 
     with house_style():
-        data = ReportData(results, quantities)
+        data = ReportData(results, several(quantities))
         sections = sections_of(data)
         pictures = {p.name: pictured(p.draw(), f"plot-{p.name}", p.title) for s in sections for p in s.plots}
         asked = answers(data)

@@ -22,7 +22,7 @@ from tussle.batch.search.trials import MAX_TRIALS, Point, Trial
 from tussle.batch.target import Target
 from tussle.batch.variables import Variable
 from tussle.batch.varied import as_variables, variable_entry
-from tussle.documents import Whole, check_argument
+from tussle.documents import Whole, check_argument, several
 from tussle.errors import ParameterError
 from tussle.mission import Mission
 from tussle.record.run_file import versions
@@ -112,14 +112,14 @@ class Optimization:
             if variable.name in settings:
                 raise ParameterError(f"{variable.name} is set and varies; say one of the two")
         if isinstance(mission, (str, Path)):
-            reading = {**options, "plugin_files": tuple(plugin_files)}
+            reading = {**options, "plugin_files": several(plugin_files)}
             variables = tuple(with_whole_numbers(mission, settings, variables, **reading))
         self.quantity = Quantity.parse(objective)
         self.variables, self.sampler, self.is_minimized = variables, sampler, minimize
         self.sample_seed, self.per_round = sample_seed, per_round
-        self.constraints = tuple(Target.parse(text, "subject_to") for text in subject_to)
+        self.constraints = tuple(Target.parse(text, "subject_to") for text in several(subject_to))
         self._first = self._proposer().propose()
-        options |= {"settings": settings, "plugin_files": tuple(plugin_files), "ends_by_time": ends_by_time}
+        options |= {"settings": settings, "plugin_files": several(plugin_files), "ends_by_time": ends_by_time}
         options["run_timeout"] = run_timeout
         self.evaluator = Evaluator(
             mission, variables, self.quantity, runs, first_seed, options, self.constraints

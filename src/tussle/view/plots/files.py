@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from tussle.documents import several
 from tussle.errors import ParameterError, ViewError, listed, nearest_name
 from tussle.view.plots.columns import column, column_of_runs, parts_of
 from tussle.view.plots.counts import captures, has_captures, left
@@ -77,6 +78,7 @@ def write_plots(
         ViewError: Nothing was recorded, or a file cannot be written.
         MissingExtraError: Matplotlib is not installed.
     """
+    kinds, columns = several(kinds), several(columns)
     _check(kinds, between, form)
     if others and (kinds or between or not columns):
         raise ParameterError(
