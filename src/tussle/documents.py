@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import numbers
 import re
 import stat
 import sys
@@ -182,6 +183,11 @@ def problem(value: Any, rule: Rule, where: str = "") -> str:
         case Checked():
             return problem(value, rule.rule, where) or rule.problem(value, where)
     return _scalar_problem(value, rule, where)
+
+
+def is_whole(value: Any) -> bool:
+    """Whether a value is a whole number, of Python or of NumPy, and no truth value."""
+    return isinstance(value, numbers.Integral) and not isinstance(value, bool)
 
 
 def several(given: Iterable[Any]) -> tuple[Any, ...]:

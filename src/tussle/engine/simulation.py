@@ -19,7 +19,7 @@ from tussle.api.plugin import GRADES
 from tussle.declare.columns import Handle
 from tussle.declare.displays import counted, line, listing, page, table
 from tussle.declare.messages import Message, Messages
-from tussle.documents import Maybe, Real, Whole, check_argument
+from tussle.documents import Maybe, Real, Whole, check_argument, is_whole
 from tussle.engine import access
 from tussle.engine.arrivals import reset, spawn_due
 from tussle.engine.calls import Schedule
@@ -33,7 +33,7 @@ from tussle.engine.snapshot import Snapshot, restore, snapshot, state_hash
 from tussle.engine.state import SimulationState
 from tussle.engine.step_end import remove_dead, world_result
 from tussle.engine.stiffness import check_stiffness
-from tussle.errors import MissionError, ParameterError, PluginError
+from tussle.errors import MissionError, ParameterError, PluginError, SnapshotError
 from tussle.mission import GivenMission, Mission, mission_of
 from tussle.mission.rekeys import Rekeys
 from tussle.mission.spec import SHUFFLED
@@ -330,7 +330,7 @@ class Simulation:
             self._tell(world, of_message(sent, number, self._step_of(world), network, topic, ids))
 
     def _check_world(self, where: str, world: int) -> None:
-        if not (_is_whole(world) and 0 <= world < self.n_worlds):
+        if not (is_whole(world) and 0 <= world < self.n_worlds):
             raise ParameterError(
                 f"{where}: world = {world!r} is not allowed; there are worlds 0 to {self.n_worlds - 1}"
             )
@@ -510,6 +510,12 @@ class Simulation:
             self.state.population.close_handles()
             self.state.context.close()
 
+    def __reduce__(self) -> Any:
+        raise SnapshotError(
+            "a simulation is neither copied nor pickled; snapshot() returns its state, which can be, and which "
+            "Simulation(mission, seeds).restore(...) continues"
+        )
+
     def __enter__(self) -> Self:
         return self
 
@@ -521,10 +527,6 @@ class Simulation:
             self.close()
 
 
-def _is_whole(value: Any) -> bool:
-    return isinstance(value, (int, np.integer)) and not isinstance(value, bool)
-
-
 def _whole_numbers(where: str, given: Any, allowed: str) -> tuple[int, ...]:
     found = (
         given.tolist()
@@ -533,12 +535,12 @@ def _whole_numbers(where: str, given: Any, allowed: str) -> tuple[int, ...]:
         if isinstance(given, Iterable)
         else None
     )
-    if not isinstance(found, list) or not all(map(_is_whole, found)):
+    if not isinstance(found, list) or not all(map(is_whole, found)):
         raise ParameterError(f"{where} = {given!r:.60} is not allowed; it takes {allowed}")
     return tuple(map(int, found))
 
 
 def _check_seeds(seeds: Iterable[Any]) -> None:
     for seed in seeds:
-        if not (_is_whole(seed) and 0 <= seed <= MAX_SEED):
+        if not (is_whole(seed) and 0 <= seed <= MAX_SEED):
             raise ParameterError(f"seed {seed!r} is not allowed; it takes a whole number from 0 to 2^64 - 1")

@@ -34,6 +34,8 @@ def resolve(
     Raises:
         ParameterError: A name is not found; the message names it, the existing names and the nearest one.
     """
+    if not isinstance(path, str):
+        raise ParameterError(f"{path!r:.60} is no path; it takes a text such as 'prey.Boids.max_speed'")
     *names, last = path.split(".")
     owners, owner, label = [], start, "the mission"
     for name in names:

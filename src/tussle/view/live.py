@@ -12,7 +12,7 @@ from typing import Any, Self
 import numpy as np
 
 from tussle.declare.messages import CustomKeyPress, Message, RemoveEntity, WorldPointClicked
-from tussle.documents import POSITIVE, check_argument
+from tussle.documents import POSITIVE, check_argument, is_whole
 from tussle.engine.result import WorldResult
 from tussle.engine.simulation import Simulation
 from tussle.engine.step_end import world_result
@@ -104,7 +104,7 @@ class Live:
         check_argument("snapshot_every", snapshot_every, POSITIVE)
         check_argument("memory", memory, POSITIVE)
         check_argument("margin", margin, POSITIVE)
-        if not 0 <= world < simulation.n_worlds:
+        if not (is_whole(world) and 0 <= world < simulation.n_worlds):
             raise ParameterError(
                 f"world = {world!r} is not allowed; there are worlds 0 to {simulation.n_worlds - 1}"
             )

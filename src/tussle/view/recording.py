@@ -15,6 +15,7 @@ import pyarrow.compute as pc
 
 from tussle.api.draw import KINDS
 from tussle.batch.trust import DirectoryCode
+from tussle.documents import is_whole
 from tussle.errors import ParameterError, RecordError, TussleError, listed, nearest_name
 from tussle.mission import Loaded, Mission, PluginFile, read_mission
 from tussle.record import Run, load_run
@@ -126,7 +127,7 @@ class Recording:
         first, worlds, step = self._frame_starts()
         last = np.concatenate([first[1:], self._starts[-1:]])[: len(first)]
         n_worlds = max(len(self.run.info.get("worlds", ())), int(worlds.max(initial=-1)) + 1)
-        if not 0 <= self.world < max(n_worlds, 1):
+        if not (is_whole(self.world) and 0 <= self.world < max(n_worlds, 1)):
             raise RecordError(
                 f"{self.path}: there is no world {self.world}; there are worlds 0 to {n_worlds - 1}"
             )

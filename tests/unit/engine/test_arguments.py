@@ -1,6 +1,8 @@
 """Numbers that `Simulation` takes: others are refused before anything happens, and nothing is rounded."""
 
+import copy
 import math
+import pickle
 import re
 
 import numpy as np
@@ -8,7 +10,7 @@ import pytest
 
 from tussle import Block, Mission, Simulation
 from tussle.api import Autonomy, State
-from tussle.errors import ParameterError, TussleError
+from tussle.errors import ParameterError, SnapshotError, TussleError
 from tussle.messages import Waypoint
 from tussle.stock import Still
 
@@ -102,3 +104,23 @@ def test_what_a_column_cannot_hold_is_not_written(path, value, text):
         with pytest.raises(ParameterError, match=re.escape(text)):
             made.write(path, value)
         assert made.state_hash() == before
+
+
+@pytest.mark.parametrize("path", [None, 5, ("a", "pos"), b"a.pos"])
+def test_a_path_is_a_text(path, simulation):
+    calls = (
+        lambda: simulation.read(path),
+        lambda: simulation.write(path, 1.0),
+        lambda: simulation.reset([0], params={path: 1.0}),
+        lambda: Simulation(MISSION, params={path: 1.0}),
+    )
+    for call in calls:
+        with pytest.raises(ParameterError, match=re.escape(f"{path!r} is no path; it takes a text")):
+            call()
+
+
+@pytest.mark.parametrize("copied", [copy.copy, copy.deepcopy, pickle.dumps])
+def test_a_simulation_is_not_copied_but_its_snapshot_is(copied, simulation):
+    with pytest.raises(SnapshotError, match=r"neither copied nor pickled; snapshot\(\) returns its state"):
+        copied(simulation)
+    copied(simulation.snapshot())

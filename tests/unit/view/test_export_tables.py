@@ -109,8 +109,9 @@ def test_what_cannot_be_is_refused_and_leaves_nothing(played, tmp_path, kind):
         write_tables(played, tmp_path / "a.cvs", "cvs")
     with pytest.raises(RecordError, match="it is not a run directory"):
         write_tables(tmp_path, tmp_path / "a", kind)
-    with pytest.raises(RecordError, match="there is no world 2; there are worlds 0 to 1"):
-        write_tables(played, tmp_path / "a", kind, world=2)
+    for world in (2, 0.5, "a"):
+        with pytest.raises(RecordError, match=f"there is no world {world}; there are worlds 0 to 1"):
+            write_tables(played, tmp_path / "a", kind, world=world)
     with pytest.raises(ViewError, match="nowhere/a: cannot be written: No such file or directory"):
         write_tables(played, tmp_path / "nowhere" / "a", kind)
     (tmp_path / "folder").mkdir()

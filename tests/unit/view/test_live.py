@@ -283,6 +283,8 @@ def test_values_that_are_not_allowed(live):
     sim = Simulation(clickable())
     for settings, text in (
         ({"world": 1}, r"world = 1 is not allowed; there are worlds 0 to 0"),
+        ({"world": 0.5}, r"world = 0.5 is not allowed; there are worlds 0 to 0"),
+        ({"world": "a"}, r"world = 'a' is not allowed; there are worlds 0 to 0"),
         ({"pace": 0.0}, "warp = 0.0 is not allowed"),
         ({"pace": "fast"}, "warp = 'fast' is not allowed"),
         ({"snapshot_every": 0.0}, "snapshot_every = 0.0 is not allowed"),

@@ -181,7 +181,7 @@ def test_a_run_that_was_cut_in_the_midst_of_a_batch(tmp_path, played):
 def test_what_is_no_run_and_worlds_that_are_not_there(tmp_path, played):
     with pytest.raises(RecordError, match="not a run directory"):
         Recording(tmp_path)
-    for world in (3, -1):
+    for world in (3, -1, 0.5, "a", True):
         with pytest.raises(RecordError, match=f"there is no world {world}; there are worlds 0 to 2"):
             Recording(played[0], world)
 

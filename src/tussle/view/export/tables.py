@@ -12,7 +12,7 @@ import pyarrow.compute as pc
 import pyarrow.csv
 import pyarrow.parquet
 
-from tussle.documents import DAMAGED
+from tussle.documents import DAMAGED, is_whole
 from tussle.errors import ParameterError, RecordError, listed, nearest_name
 from tussle.record.arrow_file import read_batches
 from tussle.record.run import run_directory
@@ -106,7 +106,7 @@ def _check(place: Path, world: int | None, report: TablesReport) -> None:
             f"{RUN_FILE} is missing: the run is still going on or was killed; its states so far are exported"
         )
         return
-    if world is not None and not 0 <= world < len(worlds):
+    if world is not None and not (is_whole(world) and 0 <= world < len(worlds)):
         raise RecordError(f"{place}: there is no world {world}; there are worlds 0 to {len(worlds) - 1}")
 
 
