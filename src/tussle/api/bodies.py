@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from tussle.api import kernels
-from tussle.errors import listed, nearest_name
+from tussle.errors import ParameterError, listed, nearest_name
 from tussle.numeric.neighbors.index import Index, Split, padded
 from tussle.numeric.neighbors.kernels import update
 from tussle.world.rays.bodies import BodyTree
@@ -219,6 +219,11 @@ class Bodies:
 
     def rows_of(self, world: np.ndarray, ids: np.ndarray) -> np.ndarray:
         """Row of each (world, id), (m,); -1 for id 0 and for removed entities."""
+        ids = np.asarray(ids)
+        if ids.shape != world.shape or (ids.dtype.kind not in "iu" and ids.size):
+            raise ParameterError(
+                f"ids = an array of {ids.dtype}, {ids.shape} is not allowed; it takes whole numbers, {world.shape}"
+            )
         _, _, id_row, id_start = self.layout()
         rows = np.empty(len(ids), np.int64)
         kernels.find_rows(world, np.ascontiguousarray(ids, np.int64), id_row, id_start, rows)

@@ -24,7 +24,8 @@ from tussle.api.bodies import (
 from tussle.api.context import Context, stream
 from tussle.api.draw import Draw
 from tussle.api.pairs import Nearest, Pairs, find_nearest, find_pairs
-from tussle.errors import DeclarationError, PluginError, listed, nearest_name
+from tussle.documents import Whole, check_argument
+from tussle.errors import DeclarationError, ParameterError, PluginError, listed, nearest_name
 from tussle.numeric import rng
 from tussle.numeric.neighbors.index import Index, next_size
 from tussle.world.scene import Hits, Scene, TeamRegion
@@ -267,7 +268,11 @@ class GroupView:
         return self._bodies.rows_of(world, ids)
 
     def rows_of(self, ids: np.ndarray) -> np.ndarray:
-        """Rows in `bodies` of the entities with these ids, (n,), in the worlds of the rows; -1 for id 0 and removed entities."""
+        """Rows in `bodies` of the entities with these ids, (n,), in the worlds of the rows; -1 for id 0 and removed entities.
+
+        Raises:
+            ParameterError: The ids are not whole numbers, or of another shape.
+        """
         return self._bodies.rows_of(self.world, ids)
 
     def reach(self, radius: float | np.ndarray, is_constant: bool = False) -> float | np.ndarray:
@@ -333,9 +338,28 @@ class GroupView:
         Args:
             radius: One number or (n,) [m].
             teams: "own", "other", a team number, or None for all.
+
+        Raises:
+            ParameterError: A value or a shape is not allowed.
         """
+        radius = self._checked_radius(radius)
         index, rows = self.index(radius), (self.first, self.last)
         return find_pairs(index, self.range_points(index), rows, self.pos, radius, teams, self.bodies)
+
+    def _checked_radius(self, radius: Any) -> float | np.ndarray:
+        array = np.asarray(radius)
+        if (
+            array.dtype.kind not in "iuf"
+            or array.shape not in ((), (self.n,))
+            or (array.dtype.kind == "f" and np.isnan(array).any())
+        ):
+            given = f"{radius!r:.60}" if array.ndim == 0 else f"an array of {array.dtype}, {array.shape}"
+            raise ParameterError(
+                f"near: radius = {given} is not allowed; it takes a number, or numbers ({self.n},)"
+            )
+        if isinstance(radius, np.ndarray) and array.ndim:
+            return radius if array.dtype == float else array.astype(float)
+        return np.array(array, float) if array.ndim else float(array)
 
     def nearest(
         self, k: int = 1, teams: str | int | np.ndarray | None = None, among: np.ndarray | None = None
@@ -350,6 +374,11 @@ class GroupView:
         Raises:
             ParameterError: Both `teams` and `among` are given, or a value is not allowed.
         """
+        check_argument("nearest: k", k, Whole(1))
+        if isinstance(teams, np.ndarray) and teams.shape != (self.n,):
+            raise ParameterError(
+                f"nearest: teams = an array {teams.shape} is not allowed; it takes ({self.n},)"
+            )
         return find_nearest(self._bodies, (self.first, self.last), self.pos, k, teams, among)
 
     def cast(

@@ -29,6 +29,15 @@ class EntityPlugin(Plugin):
     wired: frozenset[str]
     """In a simulation: names of the outputs that other plugins read. Other outputs need not be written."""
 
+    def __init_subclass__(cls, **kwargs: Any) -> None:
+        super().__init_subclass__(**kwargs)
+        for name, column in cls.states().items():
+            if column.per != "entity":
+                raise DeclarationError(
+                    f"{cls.__name__}.{name}: a column per {column.per} belongs to an interaction, a network or a metric; "
+                    "a plugin of an entity has State(per='entity')"
+                )
+
     def unused_states(self) -> tuple[str, ...]:
         """Return names of `State` columns that this instance leaves at their defaults; they are not part of the state hash."""
         return ()

@@ -135,11 +135,23 @@ class NeighborLaw:
         """Check that all arguments and radii of the laws exist in a plugin class.
 
         Raises:
-            DeclarationError: An argument or radius is neither a name of the pair nor a column.
+            DeclarationError: An argument or radius is neither a name of the pair nor a column, or a radius is no real number.
         """
         own = [*PAIR, *own_columns(cls)]
         allowed = [*own, *(OTHER + part for part in BODY)]
+        numbers = cls.declared(Numbers)  # type: ignore[attr-defined]
         for law in (*self.laws, *([self.where] if self.where else [])):
+            for radius in law.radii:
+                is_number = (
+                    isinstance(radius, (int, float)) and not isinstance(radius, bool) and radius >= 0.0
+                )
+                if isinstance(radius, str) and radius in numbers:
+                    is_number = numbers[radius].dtype is float
+                if not (is_number or (isinstance(radius, str) and radius not in numbers)):
+                    raise DeclarationError(
+                        f"{label(law.function)}: {cls.__name__}.{name}: the radius {radius!r} is not allowed; it takes a real number >= 0, "
+                        "or the name of a column of them, such as Param(30.0)"
+                    )
             for column in law.columns:
                 if column not in allowed:
                     raise DeclarationError(

@@ -31,6 +31,8 @@ C = TypeVar("C", bound=Column)
 GRADES = ("portable", "machine", "external")
 RATE = Param(1.0, unit="1/s", gt=0.0, lt=math.inf)
 RESERVED = ("name", "rate", "states")
+TAKEN = ("columns", "services", "wired", "values", "kind")
+"""Attributes of every plugin, which no column can be."""
 
 
 @dataclass(frozen=True)
@@ -107,7 +109,7 @@ class Plugin:
         if cls.grade not in GRADES:
             raise DeclarationError(f"{cls.__name__}.grade is {cls.grade!r}; allowed are {', '.join(GRADES)}")
         for name, column in cls.columns.items():
-            if name in RESERVED or name.startswith("_"):
+            if name in (*RESERVED, *TAKEN) or name.startswith("_"):
                 raise DeclarationError(
                     f"{cls.__name__}.{name}: the name is reserved; choose another name for this {type(column).__name__}"
                 )

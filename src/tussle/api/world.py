@@ -90,8 +90,12 @@ class WorldView(GroupView):
         return np.searchsorted(self.teams, team)
 
     def rows_at(self, world: np.ndarray, ids: np.ndarray) -> np.ndarray:
-        """Row of each (world, id), (m,); -1 for id 0 and for removed entities."""
-        return self._bodies.rows_of(np.ascontiguousarray(world, np.int64), ids)
+        """Row of each (world, id), (m,); -1 for id 0 and for removed entities.
+
+        Raises:
+            ParameterError: There is no such world, or there are not as many whole numbers as worlds.
+        """
+        return self._bodies.rows_of(numbers_below(self.n_worlds, world, "rows_at: world"), ids)
 
     # -- changes ----------------------------------------------------------------------------------------------------------
 

@@ -67,6 +67,8 @@ class Column:
 
 
 def _fields(text: str, what: str) -> tuple[str, ...]:
+    if not isinstance(text, str):
+        raise DeclarationError(f"{what}: names = {text!r:.60} is not allowed; it takes a text, such as 'x y'")
     names = tuple(text.split())
     for name in names:
         if not name.isidentifier():
@@ -89,6 +91,7 @@ class Numbers(Column):
     """
 
     recorded: bool = False
+    default: Any
 
     def __init__(
         self, fields: str, unit: str, dtype: type, doc: str, ragged: bool = False, text_unit: str = ""
@@ -114,6 +117,26 @@ class Numbers(Column):
         return f"list of {' '.join(self.fields)}".strip() if self.ragged else " ".join(
             self.fields
         ), f"[{self.unit}]" * bool(self.unit)
+
+    def _set_default(self, default: Any) -> None:
+        """Set the value of a new row: one number, or one for each component."""
+        values = tuple(default) if isinstance(default, (tuple, list, np.ndarray)) else (default,)
+        is_alone = not isinstance(default, (tuple, list, np.ndarray))
+        allowed = {float: "a number", int: "a whole number of 64 bits", bool: "true or false"}[self.dtype]
+        if not all(map(self._holds, values)) or not (is_alone or len(values) == len(self.fields)):
+            several = f", or {len(self.fields)} ({', '.join(self.fields)})" if self.fields else ""
+            raise DeclarationError(
+                f"{type(self).__name__}: default = {default!r:.60} is not allowed; it takes {allowed}{several}"
+            )
+        self.default = default if is_alone else values
+
+    def _holds(self, value: Any) -> bool:
+        """Whether a value is one of the column's type."""
+        if not isinstance(value, (int, float, np.number, np.bool_)):
+            return False
+        if self.dtype is int:
+            return bool(value == value // 1) and -(2**63) <= value < 2**63
+        return self.dtype is float or value in (0, 1)
 
     def _set_recorded(self, recorded: bool, per: str = "entity") -> None:
         if recorded and (self.ragged or per != "entity"):
@@ -358,11 +381,15 @@ class State(Numbers):
         self._set_recorded(recorded, per)
         if per not in PER:
             raise DeclarationError(f"State: per={per!r} is not one of {', '.join(PER)}")
+        if per == "team" and fields:
+            raise DeclarationError(
+                f"State: fields={fields!r} with per='team', which has one number per team; declare several columns"
+            )
         if ragged and (per != "entity" or default):
             raise DeclarationError(
                 "State: a ragged column is per entity and initially empty; it takes neither per nor default"
             )
-        self.default = default
+        self._set_default(default)
         self.per = per
 
 
@@ -410,7 +437,7 @@ class Input(Channel):
         if ragged and default:
             raise DeclarationError("Input: a ragged column is initially empty; it takes no default")
         self.optional = optional
-        self.default = default
+        self._set_default(default)
 
 
 class Output(Channel):
@@ -541,6 +568,8 @@ class Topic(Column):
         doc: str = "",
     ) -> None:
         super().__init__(doc=doc)
+        if not (isinstance(message, type) and isinstance(getattr(message, "fields", None), dict)):
+            raise DeclarationError(f"{type(self).__name__}: {message!r:.60} is not a class of messages")
         self.message = message
         self.topic = topic or message.__name__
         self.network = network

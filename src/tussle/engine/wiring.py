@@ -147,12 +147,15 @@ class Wiring:
         return bus
 
     def _add(self, bus: Bus, column: Channel) -> None:
+        default = column.default
+        each = default if isinstance(default, tuple) else [default] * len(column.channels)
+        defaults = dict(zip(column.channels, each, strict=True))
         for channel, form in _forms(column).items():
             if channel not in bus.row:
                 if column.ragged:
                     bus.row[channel] = self.table.add_list(column)
                 else:
-                    place = self.table.add(("channel", len(self.table.places)), float, 0, column.default)  # type: ignore[attr-defined]
+                    place = self.table.add(("channel", len(self.table.places)), float, 0, defaults[channel])
                     bus.row[channel] = place.first
                 bus.fields[channel], bus.unit[channel] = form
 

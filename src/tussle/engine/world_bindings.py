@@ -123,7 +123,8 @@ class WorldBinding:
     def reset(self, worlds: np.ndarray) -> None:
         """Reset the states of some worlds to the declared defaults."""
         for place, default in self.memory:
-            self.tables["world"].array(place)[..., worlds] = default
+            several = np.reshape(default, (-1, 1)) if isinstance(default, tuple) else default
+            self.tables["world"].array(place)[..., worlds] = several
 
     def rearrange(self, index: np.ndarray) -> None:
         """Reorder the states per entity, after the body table has been repacked."""

@@ -1,0 +1,138 @@
+"""Declarations and arguments of views that cannot be are refused by name; none is taken for something else."""
+
+import math
+
+import numpy as np
+import pytest
+from small_worlds import block, mission
+
+from tussle import Simulation
+from tussle.api import Autonomy, Input, Interaction, Metric, Param, Publish, State, Subscribe, neighbors
+from tussle.errors import DeclarationError, PluginError
+from tussle.stock import Still
+
+
+@pytest.mark.parametrize(
+    ("declare", "text"),
+    [
+        (lambda: State("x y", default=(1, 2, 3)), r"State: default = \(1, 2, 3\) is not allowed; it takes a number, or 2 \(x, y\)"),
+        (lambda: State("x y", default=(1,)), r"default = \(1,\) is not allowed"),
+        (lambda: State(default=(1, 2)), r"default = \(1, 2\) is not allowed; it takes a number$"),
+        (lambda: State(default="x"), "default = 'x' is not allowed; it takes a number"),
+        (lambda: State(default=None), "default = None is not allowed"),
+        (lambda: State(dtype=int, default=1.5), "default = 1.5 is not allowed; it takes a whole number of 64 bits"),
+        (lambda: State(dtype=int, default=2**63), "it takes a whole number of 64 bits"),
+        (lambda: State(dtype=int, default=math.nan), "default = nan is not allowed; it takes a whole number"),
+        (lambda: State(dtype=bool, default=2), "default = 2 is not allowed; it takes true or false"),
+        (lambda: State("x y", dtype=int, default=(1, 0.5)), r"it takes a whole number of 64 bits, or 2 \(x, y\)"),
+        (lambda: Input("u v", optional=True, default=(1, 2, 3)), r"Input: default = \(1, 2, 3\) is not allowed"),
+        (lambda: State("a b", per="team"), "fields='a b' with per='team', which has one number per team"),
+        (lambda: State(5), "State: names = 5 is not allowed; it takes a text"),
+        (lambda: Publish(3), "Publish: 3 is not a class of messages"),
+        (lambda: Subscribe(Autonomy), "Subscribe: <class .*Autonomy'> is not a class of messages"),
+        *(
+            (lambda name=name: type("Own", (Autonomy,), {name: State()}), f"Own.{name}: the name is reserved")
+            for name in ("columns", "services", "wired", "values", "kind", "rate")
+        ),
+        (lambda: type("Own", (Autonomy,), {"n": State(per="world")}), "Own.n: a column per world belongs to an interaction"),
+        (lambda: type("Own", (Autonomy,), {"n": State(per="team")}), "Own.n: a column per team belongs"),
+    ],
+)  # fmt: skip
+def test_declarations_that_cannot_be(declare, text):
+    with pytest.raises(DeclarationError, match=text):
+        declare()
+
+
+def test_defaults_are_those_of_their_columns():
+    class Own(Metric):
+        pair = State("a b", default=[1.5, math.nan], per="world")
+        one = State(default=7, per="world")
+        marks = State("c d", dtype=bool, default=(True, 0), per="world")
+        count = State(dtype=int, default=3.0, per="world")
+
+    with Simulation(mission(block("a", team=1), metrics=[Own()]), seeds=[1, 2]) as simulation:
+        simulation.step()
+        simulation.reset([1])
+        found = {name: simulation.read(f"Own.{name}")[0].tolist() for name in ("one", "marks", "count")}
+        assert found == {"one": [7.0] * 2, "marks": [[True, False]] * 2, "count": [3] * 2}
+        np.testing.assert_array_equal(simulation.read("Own.pair")[0], [[1.5, math.nan]] * 2)
+
+
+@pytest.mark.parametrize("radius", [-1.0, math.nan, None, True, (30.0,), "number", "whole"])
+def test_the_radius_of_a_law_is_a_real_number(radius):
+    def alone(distance):
+        return distance
+
+    own = {
+        "number": Param(True),
+        "whole": Param(3),
+        "near": neighbors(radius, n="count")(staticmethod(alone)),
+    }
+    with pytest.raises(
+        DeclarationError, match=r"Own.near: the radius .* is not allowed; it takes a real number >= 0"
+    ):
+        type("Own", (Autonomy,), own)
+
+
+def looks(look):
+    """An interaction that does this in its step, with 5 rows."""
+
+    def step(self, w):
+        look(w)
+
+    with Simulation(
+        mission(block("a", team=1, count=5), interactions=[type("Looks", (Interaction,), {"step": step})()])
+    ) as made:
+        made.step()
+
+
+@pytest.mark.parametrize(
+    ("look", "text"),
+    [
+        *(
+            (lambda w, radius=radius: w.near(radius), "near: radius = .* is not allowed; it takes a number, or numbers")
+            for radius in (
+                math.nan, None, "30 m", True, np.ones(3), np.ones((5, 1)), np.ones(5, bool), np.array([1, np.nan, 1, 1, 1.0]),
+            )
+        ),
+        *(
+            (lambda w, k=k: w.nearest(k), "nearest: k = .* is not allowed; it takes a whole number >= 1")
+            for k in (0, -1, 1.5, "2", True)
+        ),
+        (lambda w: w.nearest(teams=np.ones(3)), r"nearest: teams = an array \(3,\) is not allowed; it takes \(5,\)"),
+        *(
+            (lambda w, ids=ids: w.rows_of(ids), r"ids = an array of .* is not allowed; it takes whole numbers, \(5,\)")
+            for ids in ([1], list(range(9)), [1.5] * 5, 3, ["a"] * 5, np.ones((5, 1), int))
+        ),
+        (lambda w: w.rows_at([0, 0], [1]), r"ids = an array of int64, \(1,\) is not allowed; it takes whole numbers, \(2,\)"),
+        (lambda w: w.rows_at([1], [1]), "rows_at: world = 1 is not allowed; it takes whole numbers from 0 to 0"),
+    ],
+)  # fmt: skip
+def test_arguments_of_views_that_cannot_be(look, text):
+    with pytest.raises(PluginError, match=text):
+        looks(look)
+
+
+@pytest.mark.parametrize(
+    "radius", [30, np.float32(30), np.int64(30), [30.0] * 5, np.full(5, 30), np.full(5, 30, np.float32)]
+)
+def test_a_radius_of_any_type_is_that_number(radius):
+    def look(w):
+        np.testing.assert_array_equal(w.near(radius).distance, w.near(30.0).distance)
+        assert w.rows_of([1, 2, 3, 4, 5]).tolist() == [0, 1, 2, 3, 4]
+
+    looks(look)
+
+
+def test_the_default_of_an_input_has_a_number_for_each_channel():
+    class Reads(Autonomy):
+        two = Input("east north", unit="m", optional=True, default=(3.0, 4.0))
+        one = Input("up", unit="m", optional=True, default=5.0)
+        seen = State("a b c")
+
+        def step(self, g):
+            self.seen[:] = *self.two, *self.one
+
+    with Simulation(mission(block("a", team=1, autonomy=Reads(), motion=Still()))) as simulation:
+        simulation.step()
+        assert simulation.read("a.Reads.seen")[0].ravel().tolist() == [3.0, 4.0, 5.0]
