@@ -135,7 +135,7 @@ class Numbers(Column):
         if not isinstance(value, (int, float, np.number, np.bool_)):
             return False
         if self.dtype is int:
-            return bool(value == value // 1) and -(2**63) <= value < 2**63
+            return float(value).is_integer() and -(2**63) <= value < 2**63
         return self.dtype is float or value in (0, 1)
 
     def _set_recorded(self, recorded: bool, per: str = "entity") -> None:
@@ -568,7 +568,7 @@ class Topic(Column):
         doc: str = "",
     ) -> None:
         super().__init__(doc=doc)
-        if not (isinstance(message, type) and isinstance(getattr(message, "fields", None), dict)):
+        if not isinstance(getattr(message, "fields", None), dict):
             raise DeclarationError(f"{type(self).__name__}: {message!r:.60} is not a class of messages")
         self.message = message
         self.topic = topic or message.__name__

@@ -212,7 +212,7 @@ class Wiring:
         """Location of a channel column that is not connected."""
         if column.ragged:
             return self.table.add_list(column)
-        return Link(self.table.add(key, float, len(column.fields), column.default))  # type: ignore[attr-defined]
+        return Link(self.table.add(key, float, len(column.fields), column.default))
 
     def _link(self, column: Channel, bus: Bus) -> Link | int:
         rows = tuple(bus.row[c] for c in column.channels)
