@@ -339,10 +339,8 @@ class Results:
         Raises:
             ParameterError: There is no such quantity.
         """
-        expressions = several(expressions)
-        return InformativeQuantities({text: self.quantity(text) for text in expressions}, self._varied)(
-            expressions
-        )
+        found = {text: self.quantity(text) for text in several(expressions)}
+        return InformativeQuantities(found, self._varied)(tuple(found))
 
     @property
     def _varied(self) -> list[list[Any]]:

@@ -135,8 +135,8 @@ class Numbers(Column):
         if not isinstance(value, (int, float, np.number, np.bool_)):
             return False
         if self.dtype is int:
-            return float(value).is_integer() and -(2**63) <= value < 2**63
-        return self.dtype is float or value in (0, 1)
+            return bool(float(value).is_integer() and -(2**63) <= value < 2**63)
+        return self.dtype is float or bool(value in (0, 1))
 
     def _set_recorded(self, recorded: bool, per: str = "entity") -> None:
         if recorded and (self.ragged or per != "entity"):
