@@ -5,7 +5,8 @@ from __future__ import annotations
 import errno
 import os
 import stat
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO, Any
 
@@ -67,6 +68,27 @@ def lock(file: IO[Any], *, wait: bool) -> None:
     if fcntl is None:
         raise OSError(errno.ENOLCK, os.strerror(errno.ENOLCK))
     fcntl.flock(file, fcntl.LOCK_EX if wait else fcntl.LOCK_EX | fcntl.LOCK_NB)
+
+
+@contextmanager
+def whole_file(path: Path, suffix: str = ".part") -> Iterator[Path]:
+    """A temporary file with this suffix that replaces the file if nothing was raised, and is deleted else.
+
+    Raises:
+        OSError: The file cannot be written, or there is a folder, a device, a pipe or a link, none of which is replaced.
+    """
+    part = path.with_name(f".{path.name}{suffix}")
+    try:
+        if os.path.lexists(path) and not stat.S_ISREG(path.lstat().st_mode):
+            raise OSError(f"it is {'a directory' if path.is_dir() else 'no regular file'}")
+        part.unlink(missing_ok=True)
+        part.touch()
+        yield part
+        part.replace(path)
+    except BaseException:
+        with suppress(OSError):
+            part.unlink(missing_ok=True)
+        raise
 
 
 def read_own(path: Path) -> tuple[bytes, float]:

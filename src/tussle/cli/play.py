@@ -29,6 +29,7 @@ from tussle.cli.terminal import OK, WRONG_INPUT, out, say, say_error, say_note
 from tussle.declare.displays import counted
 from tussle.engine.simulation import Simulation
 from tussle.errors import BatchError, MissionError, ParameterError, RecordError, TussleError, WiringError
+from tussle.folders import whole_file
 from tussle.mission import Loaded, Mission, to_python, to_xml
 from tussle.pacing import Pace
 from tussle.plugins import stock
@@ -182,11 +183,11 @@ def convert(options: ConvertOptions) -> None:
         say_note(f"{options.to} has no settings of the viewer, such as colours")
     is_code = options.to.suffix == ".py"
     text = (to_python if is_code else to_xml)(mission, seed)
+    if options.to.exists():
+        raise MissionError(f"{options.to}: exists already; choose another name, or remove it")
     try:
-        with options.to.open("x", encoding="utf-8") as file:
-            file.write(text)
-    except FileExistsError:
-        raise MissionError(f"{options.to}: exists already; choose another name, or remove it") from None
+        with whole_file(options.to) as part:
+            part.write_text(text, encoding="utf-8")
     except OSError as error:
         raise MissionError(f"{options.to}: cannot be written: {error.strerror or error}") from error
     command = "python" if is_code else "tussle run"

@@ -117,7 +117,10 @@ def test_what_cannot_be_is_refused_and_leaves_nothing(played, tmp_path, kind):
     (tmp_path / "folder").mkdir()
     with pytest.raises(ViewError, match="folder: cannot be written: it is a directory"):
         write_tables(played, tmp_path / "folder", kind)
-    assert [p.name for p in tmp_path.iterdir()] == ["folder"]
+    (tmp_path / "link").symlink_to("/dev/full")
+    with pytest.raises(ViewError, match="link: cannot be written: it is no regular file"):
+        write_tables(played, tmp_path / "link", kind)
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["folder", "link"]
 
 
 def test_an_interruption_leaves_nothing(played, tmp_path):

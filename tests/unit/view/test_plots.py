@@ -552,7 +552,7 @@ def test_a_place_that_cannot_be_written_is_told(collided, tmp_path):
     with pytest.raises(ViewError, match="taken: the plots cannot be written: "):
         write_plots(Recording(collided), tmp_path / "taken")
     (tmp_path / "speed.png").mkdir()
-    with pytest.raises(ViewError, match=r"speed\.png: the plot cannot be written: "):
+    with pytest.raises(ViewError, match=r"speed\.png: cannot be written: it is a directory"):
         write_plots(Recording(collided), tmp_path, ["speed"])
 
 

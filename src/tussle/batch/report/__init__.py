@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from importlib.resources import files
 from pathlib import Path
@@ -11,6 +12,7 @@ from typing import TYPE_CHECKING
 
 from tussle.documents import several
 from tussle.errors import MissingExtraError, RecordError
+from tussle.folders import whole_file
 
 if TYPE_CHECKING:
     from tussle.batch.report.answers import ShortAnswer
@@ -171,10 +173,14 @@ def write_page(
     )  # fmt: skip
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        for name, picture in pictures.items():
-            path.with_name(f"{name}.svg").write_text(picture.svg, encoding="utf-8")
-            path.with_name(f"{name}.png").write_bytes(picture.png)
-        path.write_text(html, encoding="utf-8")
+        with ExitStack() as made:  # all of them or none
+            for name, picture in pictures.items():
+                svg, png = (
+                    made.enter_context(whole_file(path.with_name(name + end))) for end in (".svg", ".png")
+                )
+                svg.write_text(picture.svg, encoding="utf-8")
+                png.write_bytes(picture.png)
+            made.enter_context(whole_file(path)).write_text(html, encoding="utf-8")
     except OSError as error:
         raise RecordError(
             f"{path.parent}: the report cannot be written: {error.strerror or error}"

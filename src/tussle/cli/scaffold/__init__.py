@@ -5,6 +5,7 @@ from __future__ import annotations
 import keyword
 import re
 import shlex
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ from tussle.cli.scaffold.played import example_text, mission_text
 from tussle.cli.tables import fact_list, indented
 from tussle.cli.terminal import put
 from tussle.errors import MissionError, ParameterError, listed, nearest_name
+from tussle.folders import whole_file
 from tussle.plugins import stock
 
 TEMPLATES = Path(__file__).parent / "templates"
@@ -128,9 +130,10 @@ def _write(texts: dict[Path, str]) -> None:
     for path in texts:
         if path.exists():
             raise MissionError(f"{path}: the file exists already; choose another name, or remove the file")
-    for path, text in texts.items():
-        try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_text(text, encoding="utf-8")
-        except OSError as error:
-            raise MissionError(f"{path}: the file cannot be written: {error.strerror or error}") from error
+    try:
+        with ExitStack() as files:  # all of them or none
+            for path, text in texts.items():
+                path.parent.mkdir(parents=True, exist_ok=True)
+                files.enter_context(whole_file(path)).write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise MissionError(f"{path}: the file cannot be written: {error.strerror or error}") from error

@@ -16,7 +16,8 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -103,6 +104,7 @@ def write_mcap(
     options = MCAPWriteOptions(chunk_size=CHUNK, compression_threads=0)
     with (
         whole_file(Path(path)) as part,
+        _told_as_os_error(),
         foxglove.open_mcap(part, allow_overwrite=True, context=context, writer_options=options) as file,
     ):
         messages = _Messages(recording, report, context)
@@ -126,6 +128,17 @@ def write_mcap(
         log_until(math.inf)
         report.n_frames = len(kept)
     return report
+
+
+@contextmanager
+def _told_as_os_error() -> Iterator[None]:
+    """Raise errors of foxglove-sdk, which are those of writing, as errors of the system."""
+    try:
+        yield
+    except RuntimeError as error:
+        if not str(error).startswith("FoxgloveError"):
+            raise
+        raise OSError(str(error)) from error
 
 
 def default_scale(recording: Recording) -> float:

@@ -7,29 +7,22 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from tussle import folders
 from tussle.errors import ViewError
 
 
 @contextmanager
 def whole_file(path: Path, suffix: str = ".part") -> Iterator[Path]:
-    """A temporary file with this suffix that replaces the file if nothing was raised, and is deleted else.
+    """`tussle.folders.whole_file` for a file that the user asked for.
 
     Raises:
         ViewError: The file cannot be written.
     """
-    part = path.with_name(f".{path.name}{suffix}")
     try:
-        if path.is_dir():
-            raise unwritable(path, "it is a directory")
-        part.touch()
-        yield part
-        part.replace(path)
+        with folders.whole_file(path, suffix) as part:
+            yield part
     except OSError as error:
-        part.unlink(missing_ok=True)
         raise unwritable(path, error) from error
-    except BaseException:
-        part.unlink(missing_ok=True)
-        raise
 
 
 def unwritable(path: Path, why: OSError | str) -> ViewError:

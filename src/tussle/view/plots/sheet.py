@@ -19,8 +19,8 @@ from tussle.batch.report.drawing import (
     printable,
     shortened,
 )
-from tussle.errors import ViewError
 from tussle.palette import MUTED
+from tussle.view.export.whole_file import whole_file
 from tussle.view.plots.selection import Trajectories
 
 if TYPE_CHECKING:
@@ -137,9 +137,6 @@ def save(figure: Figure, path: Path, form: str) -> str:
     Raises:
         ViewError: It cannot be written.
     """
-    try:
-        with lettering(figure) as missing:
-            figure.savefig(path, format=form, metadata=UNDATED[form])
-    except OSError as error:
-        raise ViewError(f"{path}: the plot cannot be written: {error.strerror or error}") from error
+    with whole_file(path) as part, lettering(figure) as missing:
+        figure.savefig(part, format=form, metadata=UNDATED[form])
     return "".join(sorted(missing))
