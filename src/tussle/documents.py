@@ -74,7 +74,7 @@ def read_text(path: Path, error: type[TussleError], most: int = MAX_BYTES) -> st
     """
     try:
         return read_bytes(path, error, most).decode("utf-8")
-    except ValueError as reason:
+    except UnicodeDecodeError as reason:
         raise error(f"{path}: cannot be read: {reason}") from None
 
 

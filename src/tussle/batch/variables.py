@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from tussle.declare.units import MAX_TEXT, QUANTITY, unit_of
-from tussle.errors import ParameterError, UnitError, clipped, listed, nearest_name
+from tussle.errors import ParameterError, UnitError, clipped, nearest_name
 from tussle.mission.codecs import written
 from tussle.numeric import exp, log
 
@@ -233,7 +233,9 @@ def _check_name(name: Any) -> None:
             f"a variable has a name, not {name!r}: a placeholder of the mission, or a path such as prey.Boids.max_speed"
         )
     if name in COLUMNS:
-        raise ParameterError(f"{name!r} cannot vary: the tables of a batch have columns {listed(COLUMNS)}")
+        raise ParameterError(
+            f"{name!r} cannot vary, as the tables of a batch have columns {', '.join(COLUMNS)}"
+        )
 
 
 def check_value(name: str, value: Any) -> None:

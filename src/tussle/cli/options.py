@@ -15,7 +15,7 @@ from typer.core import TyperCommand
 from tussle.cli import completion
 from tussle.cli.terminal import EXIT_CODES, OK, reported, say_note
 from tussle.declare.units import parse
-from tussle.errors import ParameterError
+from tussle.errors import MissionError, ParameterError
 
 if TYPE_CHECKING:
     from tussle.mission import Loaded, Mission
@@ -71,6 +71,15 @@ class TussleCommand(TyperCommand):
         for name in (word.partition("=")[0] for word in args):
             if name in RENAMED and any(RENAMED[name] in each.opts for each in self.params):
                 raise typer.BadParameter(f"no such option: {name}; it is now called {RENAMED[name]}")
+        for word in args:
+            try:
+                word.encode()
+            except (
+                UnicodeEncodeError
+            ):  # run and batch directories keep the command and the names of files as text
+                raise typer.BadParameter(
+                    f"{word!r} is not UTF-8 text; rename the file, or set a locale of UTF-8"
+                ) from None
         # The word after an option's name is being completed: without this, the parser would stop before the mission.
         is_cut = ctx.resilient_parsing and bool(args) and any(args[-1] in each.opts for each in self.params)
         return super().parse_args(ctx, args[:-1] if is_cut else args)
@@ -264,6 +273,9 @@ class MissionOptions(PluginOptions):
 
     def __post_init__(self) -> None:
         read_settings([*self.settings, *self.more])
+        for folder in self.data_path:
+            if not folder.expanduser().is_dir():
+                raise MissionError(f"--data-path {folder}: there is no such folder")
 
     @property
     def given(self) -> dict[str, Any]:

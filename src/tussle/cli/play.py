@@ -168,7 +168,9 @@ def _check_directory(path: Path) -> int:
         say_error(f"{path}: {line}")
     if damage:
         return WRONG_INPUT
-    out().print(f"{path} is intact", soft_wrap=True)
+    is_cut = not any((path / name).exists() for name in ("batch.json", RUN_FILE))
+    more = f" as far as it goes: it has no {RUN_FILE}, since the run was killed or goes on" if is_cut else ""
+    out().print(f"{path} is intact{more}", soft_wrap=True)
     return OK
 
 

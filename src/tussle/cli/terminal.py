@@ -20,6 +20,8 @@ from tussle.errors import BatchError, PluginError, RecordError, TussleError, vis
 
 WIDEST = 100
 """Largest width of tables and bars, in characters."""
+UNKNOWN_WIDTH = 80
+"""That for COLUMNS=0, which a shell without a terminal sets."""
 
 OK, WRONG_INPUT, USAGE, PLUGIN_FAILED, NOT_WRITTEN, RUNS_FAILED, DOES_NOT_HOLD, OWN_FAULT = (
     0,
@@ -93,7 +95,7 @@ def _shortened(line: str) -> str:
 
 def _console(stderr: bool) -> Console:
     console = PlainConsole(stderr)
-    console.width = min(console.width, WIDEST)
+    console.width = min(console.width or UNKNOWN_WIDTH, WIDEST)
     return console
 
 

@@ -73,6 +73,7 @@ class PluginReader:
         viewer: Receives attributes for the viewer: "plugin@attribute" -> text.
         unread: Tags of <param_common> that a plugin does not read: place and name -> the arguments of `Problems.unknown`.
         read: Place and name of those that a plugin reads.
+        shared_taken: Names of the <param_common> that a plugin takes.
         has_found: Whether attributes were added to tags, since they name files that were found.
         plays: Whether other plugins may stand in for those of the tags, since the mission is to be played.
     """
@@ -86,6 +87,7 @@ class PluginReader:
     viewer: dict[str, str] = field(default_factory=dict)
     unread: dict[tuple[Place, str], tuple[Place, str, str, list[str]]] = field(default_factory=dict)
     read: set[tuple[Place, str]] = field(default_factory=set)
+    shared_taken: set[str] = field(default_factory=set)
     has_found: bool = False
     plays: bool = True
 
@@ -189,6 +191,7 @@ class PluginReader:
             self.problems.absent(written.where("param_common"), "param_common", name, self.shared)
             return
         place, shared = written.where("param_common"), self.shared[name]
+        self.shared_taken.add(name)
         self.budget.spend_nodes(len(shared), place)
         self.budget.spend_text(sum(len(node.text) for node in shared.values()), str(place))
         written.common = {key: node for key, node in shared.items() if key not in written.attributes}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import os
 import re
 from collections.abc import Mapping, Sequence
@@ -88,6 +89,8 @@ def read_text(path: Path, budget: Budget) -> str:
             f"{path}: it cannot be read: {getattr(error, 'strerror', None) or error}"
         ) from None
     budget.spend_text(len(data), str(path))
+    if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        raise MissionError(f"{path}:1: this is UTF-16 or UTF-32 text; save the file as UTF-8")
     declared = ENCODING.match(data)
     name = declared[1].decode("ascii").lower() if declared else "utf-8"
     if name not in ENCODINGS:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from tussle.mission.node import Node
 from tussle.mission.problems import Problems
-from tussle.mission.tags import BASE, ENTITY, WORLD
+from tussle.mission.tags import BASE, ENTITY, WORLD, WORLD_MANY
 
 NAMED = {"param_common": ("name",), "entity_common": ("name",), "base": ()}
 """Attributes of tags that contain other tags, and that are not read elsewhere."""
@@ -13,13 +13,19 @@ KNOWN = {"runscript": WORLD, "entity": ENTITY, "entity_common": ENTITY, "base": 
 
 
 def report_stray(root: Node, problems: Problems) -> None:
-    """Report tags inside of tags that hold only a value, and attributes of tags that have none.
+    """Report tags inside of tags that hold only a value, attributes of tags that have none, and tags of <runscript> that stand twice.
 
     Args:
         root: The mission's tree, before <entity_common> is copied.
         problems: Receives what is unknown.
     """
     _report_inside(root, problems)
+    seen = set[str]()
+    for node in root.children:
+        shown = node.tag + (f" name='{node.attributes.get('name', '')}'" if node.tag in NAMED else "")
+        if shown in seen and node.tag in WORLD and node.tag not in WORLD_MANY:
+            problems.note(node.place, f"<{shown}> occurs more than once; the last one is used")
+        seen.add(shown)
     taken = {node.attributes.get("entity_common") for node in root.find_all("entity")}
     for node in root.find_all("entity_common"):
         if node.attributes.get("name") in taken:

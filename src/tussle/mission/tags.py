@@ -271,3 +271,5 @@ PLUGIN = {
 SEED_ATTRIBUTES = ("reseed_time", "reseed", "rekeys")
 MANY = ("autonomy", "controller", "sensor", "base")
 """Tags of an entity that may occur several times."""
+WORLD_MANY = ("entity", "network", "entity_interaction", "metrics", "terrain", "wall", "building")
+"""Tags of <runscript> that may occur several times; so may <param_common> and <entity_common>, with different names."""

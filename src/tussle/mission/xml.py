@@ -233,6 +233,9 @@ class _WorldReader:
         self._count_tags(nodes)
         blocks = [entities.block(node, name) for node, name in zip(nodes, block_names(nodes), strict=True)]
         plugins.report_unread()
+        for node in root.find_all("param_common"):
+            if node.attributes.get("name") not in plugins.shared_taken:
+                problems.note(node.place, "no plugin takes this <param_common>; it is ignored")
         if plugins.has_found:
             self.source.text = root.to_text()
         conditions, seed, reseed = self._end_conditions(), self._seed(), self._reseed()

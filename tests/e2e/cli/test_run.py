@@ -275,6 +275,11 @@ def test_a_plugin_that_fails_ends_the_game_and_what_was_played_is_kept(tussle, f
         (["check", "game.xml", "--set", "prey.motion_model=SimpleAircraft"], 1, "game.xml:7: block 'prey': no plugin writes"),
         (["describe", "Boid"], 1, "did you mean 'Boids'?"),
         (["fly"], 2, "fly"),
+        (["run", "game.xml", "--out", "L\udcfcufe"], 2, r"'L\udcfcufe' is not UTF-8 text; rename the file"),
+        (["export", "b\udcfc", "--csv"], 2, r"'b\udcfc' is not UTF-8 text; rename the file"),
+        (["check", "game.xml", "--data-path", "no"], 1, "--data-path no: there is no such folder"),
+        (["batch", "game.xml", "--sweep", "no.toml"], 1, "error: no.toml: cannot be read: No such file"),
+        (["batch", "game.xml", "--vary", "seed=1,2"], 1, "the tables of a batch have columns run, point, seed"),
     ],
 )  # fmt: skip
 def test_what_is_wrong_is_said_once_with_an_exit_code_and_nothing_is_written(
@@ -285,6 +290,20 @@ def test_what_is_wrong_is_said_once_with_an_exit_code_and_nothing_is_written(
     assert "Traceback" not in done.stderr
     assert not done.stdout
     assert [p.name for p in folder.iterdir()] == ["game.xml"]
+
+
+def test_a_width_that_is_not_known_hides_nothing(tussle, monkeypatch):
+    shown = tussle("plugins").stdout
+    monkeypatch.setenv("COLUMNS", "0")
+    assert tussle("plugins").stdout == shown
+
+
+def test_a_run_that_was_killed_is_intact_as_far_as_it_goes(tussle, folder):
+    tussle("run", "game.xml", "--out", "out", "--end", "0.2")
+    assert tussle("check", "out").stdout == "out is intact\n"
+    (folder / "out" / "run.json").unlink()
+    said = "out is intact as far as it goes: it has no run.json, since the run was killed or goes on\n"
+    assert tussle("check", "out").stdout == said
 
 
 @pytest.mark.parametrize("unbuffered", ["", "1"])

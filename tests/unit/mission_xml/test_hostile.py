@@ -201,6 +201,11 @@ def test_encodings(files):
         read_mission(files.write(text.format("utf-16").encode()))
     with pytest.raises(MissionError, match=r"m\.xml:2: byte 0xff is not utf-8 text"):
         read_mission(files.write(b"<runscript>\n\xff</runscript>"))
+    for name in ("utf-16", "utf-32", "utf-16-be"):
+        with pytest.raises(
+            MissionError, match=r"m\.xml:1: this is UTF-16 or UTF-32 text; save the file as UTF-8"
+        ):
+            read_mission(files.write(("\ufeff" + text.format(name)).encode(name)))
 
 
 def test_line_ends(files):

@@ -10,6 +10,10 @@ import pytest
 from tussle import Simulation
 from tussle.errors import MissionError
 from tussle.mission import read_mission, to_python, to_xml
+from tussle.mission.node import Node
+from tussle.mission.problems import Place, Problems
+from tussle.mission.stray_tags import report_stray
+from tussle.mission.tags import WORLD, WORLD_MANY
 from tussle.scene import Base, Origin
 from tussle.stock import (
     AvoidEntityMS,
@@ -350,6 +354,26 @@ def test_settings_for_the_viewer_and_the_log_are_kept(files):
 def test_what_is_ignored_is_said_with_its_line(files, inside, said):
     notes = "\n".join(files.world(inside=inside, strict=False).notes)
     assert f"m.xml:5: {said}" in notes or f"m.xml:3: {said}" in notes
+
+
+@pytest.mark.parametrize("tag", WORLD)
+def test_tags_of_the_mission_that_stand_twice_are_said_but_for_those_that_may(tag):
+    for names, is_twice in (("pp", True), ("pq", not tag.endswith("_common"))):
+        problems, place = Problems(), Place("m.xml", 1)
+        report_stray(
+            Node("runscript", {}, "", [Node(tag, {"name": name}, "", [], place) for name in names], place),
+            problems,
+        )
+        said = any("occurs more than once; the last one is used" in note for note in problems.notes)
+        assert said == (is_twice and tag not in WORLD_MANY)
+
+
+def test_shared_parameters_that_nobody_takes_are_said(files):
+    shared = "<param_common name='p'><speed>3</speed></param_common>"
+    note = "no plugin takes this <param_common>; it is ignored"
+    assert any(note in each for each in files.world(shared).notes)
+    taken = files.world(shared, inside="<autonomy param_common='p'>Straight</autonomy>")
+    assert not any(note in each for each in taken.notes)
 
 
 def test_differences_to_the_existing_system_are_said(files):
