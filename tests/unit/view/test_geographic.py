@@ -20,7 +20,7 @@ from tussle.stock import Boundary, Still
 from tussle.view import Recording
 from tussle.view.export.geographic import DEFAULT_EPOCH, write_geographic
 from tussle.view.export.geographic.formats import Heading, kml
-from tussle.view.export.geographic.places import Track
+from tussle.view.export.geographic.places import Track, to_places
 
 ORIGIN = Origin.from_degrees(-33.9, 18.4, 120.0)
 KML, GX = "{http://www.opengis.net/kml/2.2}", "{http://www.google.com/kml/ext/2.2}"
@@ -232,6 +232,17 @@ def test_odd_names_and_the_180th_meridian(tmp_path, kind):
         assert "Zoë" in str(track)
         if kind == "geojson":
             assert track["geometry"]["coordinates"][0][0] > 180.0
+
+
+@pytest.mark.parametrize("longitude", [-180.0, -95.0, 0.0, 13.0, 180.0])
+def test_an_origin_by_any_turns_is_one_place(longitude):
+    pos = np.array([[0.0, 0.0, 5.0], [-300.0, 40.0, 0.0]])
+    once = to_places(Origin.from_degrees(40.0, longitude), pos)
+    other = to_places(Origin.from_degrees(40.0, longitude - math.copysign(360.0, longitude)), pos)
+    assert np.abs(once[:, 0]).max() < 180.01
+    turns = (other - once) / (360.0, 1.0, 1.0)  # the 180th meridian is at either end
+    assert np.abs(turns - np.round(turns)).max() < 1e-9
+    assert np.abs(other[:, 0]).max() < 180.01
 
 
 def test_errors_leave_no_file(hunted, tmp_path):

@@ -85,7 +85,7 @@ def to_places(origin: Origin, pos: np.ndarray) -> np.ndarray:
     Longitudes are within half a turn of the origin's, so no line goes around the Earth.
     """
     latitude, longitude, height = origin.to_geodetic(np.asarray(pos, np.float64).T)
-    middle = math.degrees(origin.longitude)
+    middle = math.remainder(math.degrees(origin.longitude), 360.0)
     turned = middle + (np.degrees(longitude) - middle + 180.0) % 360.0 - 180.0
     degrees = np.round(np.stack([turned, np.degrees(latitude)], axis=1), DEGREE_DIGITS)
     return np.column_stack([degrees, np.round(height, HEIGHT_DIGITS)])
