@@ -157,6 +157,16 @@ class Recorder:
                 raise RecordError(
                     f"{self.directory}: holds a run already ({held[0]}); choose another directory, or remove it"
                 )
+            home, copies = self.directory.resolve(), plugin_copies(plugin_files)
+            inside = {
+                name: file for name, file in scene_files.items()
+                if (home / name).resolve().is_relative_to(home) and name not in FILES
+            }  # fmt: skip
+            for name in (*inside, *copies):
+                if (home / name).exists() and not (name in inside and inside[name].samefile(home / name)):
+                    raise RecordError(
+                        f"{self.directory}: holds another file {name!r}, which belongs to a run of this mission; choose another directory"
+                    )
             seeds = self.sim.state.context.seeds
             if mission_text and len(seeds) == 1:
                 mission_text = with_seed(mission_text, int(seeds[0]))
@@ -164,13 +174,13 @@ class Recorder:
             if mission_text:
                 (self.directory / MISSION_FILE).write_text(mission_text, encoding="utf-8")
                 self._others.append(MISSION_FILE)
-            for name, file in scene_files.items():
+            for name, file in inside.items():
                 place = self.directory / name
-                if place.resolve().is_relative_to(self.directory.resolve()) and name not in FILES:
-                    place.parent.mkdir(parents=True, exist_ok=True)
+                place.parent.mkdir(parents=True, exist_ok=True)
+                if not place.exists():  # else the mission lies where it is recorded
                     shutil.copyfile(file, place)
-                    self._others.append(name)
-            for name, text in plugin_copies(plugin_files).items():
+                self._others.append(name)
+            for name, text in copies.items():
                 (self.directory / name).parent.mkdir(parents=True, exist_ok=True)
                 (self.directory / name).write_text(text, encoding="utf-8")
                 self._others.append(name)

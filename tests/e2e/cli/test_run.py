@@ -333,6 +333,29 @@ def test_output_that_nobody_reads_is_no_error(folder):
     assert not done.stderr
 
 
+def test_files_of_the_user_where_a_run_is_recorded_are_left_alone(tussle, folder):
+    (folder / "hills.asc").write_text("ncols 3\nnrows 3\ncellsize 10\n" + "1 2 3\n" * 3)
+    text = (folder / "game.xml").read_text().replace("<seed>", "<terrain>hills.asc</terrain><seed>")
+    (folder / "game.xml").write_text(text)
+    (folder / "lone.py").write_text(
+        "from tussle.api import Metric\nclass Lone(Metric):\n    grade = 'portable'\n"
+    )
+    for own in ("taken/hills.asc", "used/plugins/0-lone/lone.py"):
+        out = folder / own.partition("/")[0]
+        (folder / own).parent.mkdir(parents=True)
+        (folder / own).write_text("mine")
+        asked = ("run", "game.xml", "--plugin-path", "lone.py", "--end", "0.1", "--out", out.name)
+        name = own.partition("/")[2]
+        assert f"{out.name}: holds another file {name!r}" in tussle(*asked, code=4).stderr
+        assert [p for p in out.rglob("*") if p.is_file()] == [folder / own]
+        assert (folder / own).read_text() == "mine"
+    before = (folder / "hills.asc").read_bytes()
+    tussle("run", "game.xml", "--end", "0.1", "--out", ".")
+    assert (folder / "hills.asc").read_bytes() == before
+    assert tussle("check", ".").stdout == ". is intact\n"
+    tussle("run", "--from", ".", "--no-log")
+
+
 def test_a_directory_that_holds_a_run_is_left_alone(tussle, folder):
     tussle("run", "game.xml", "--out", "out")
     before = {p: p.read_bytes() for p in (folder / "out").iterdir()}
