@@ -1,8 +1,9 @@
-"""A plugin that divides by the difference of two parameters refuses a range without a width."""
+"""Ranges of parameters: none without a width where a plugin divides by it, and no lower limit above its upper one."""
 
 from __future__ import annotations
 
 import ast
+import math
 
 import pytest
 from tree import parsed, python_files, relative
@@ -57,3 +58,30 @@ def test_a_range_without_width_is_refused():
         least = plugin().values[lower]
         with pytest.raises(ParameterError, match=f"{lower} must be smaller than {upper}"):
             plugin(**{upper: least})
+
+
+UNSET = {("CPA", "min_time_s"): "-1 is no limit"}
+"""Lower limits that may be above the upper ones, by plugin and parameter."""
+
+
+def limits() -> list[tuple[type[Plugin], str, str]]:
+    """Plugins with a lower and an upper limit of one quantity, which their names tell."""
+    words = (("minimum", "maximum"), ("min", "max"), ("lower", "upper"), ("least", "most"))
+    return [
+        (plugin, lower, upper)
+        for plugin in map(stock.load, stock.manifest())
+        for lower, param in plugin.params().items()
+        for low, high in words
+        if (upper := lower.replace(low, high)) != lower and upper in plugin.params()
+        if param.dtype is float and (plugin.__name__, lower) not in UNSET
+    ]
+
+
+def test_a_lower_limit_above_the_upper_one_is_refused():
+    found = limits()
+    assert len(found) > 20
+    for plugin, lower, upper in found:
+        least, most = (plugin().values[name] for name in (lower, upper))
+        least, most = (least, most) if math.isfinite(most - least) else (0.0, 1.0)
+        with pytest.raises(ParameterError, match=f"{lower} must (not be larger|be smaller) than {upper}"):
+            plugin(**{lower: most, upper: 0.5 * (least + most)})

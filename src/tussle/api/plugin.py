@@ -196,6 +196,18 @@ class Plugin:
     def check_values(self) -> None:
         """Check parameters that must fit together, as data; a hook that raises `ParameterError` if they do not."""
 
+    def check_order(self, low: str, high: str) -> None:
+        """Check that a parameter is not larger than another one; to be called by `check_values` of plugins with lower and upper limits.
+
+        Raises:
+            ParameterError: It is.
+        """
+        least, most = self.values[low], self.values[high]
+        if not least <= most:
+            raise ParameterError(
+                f"{type(self).__name__}.{low} = {least!r} with {high} = {most!r} is not allowed; {low} must not be larger than {high}"
+            )
+
     def check_range(self, low: str, high: str) -> None:
         """Check that a parameter is smaller than another one; to be called by `check_values` of plugins that divide by the difference.
 

@@ -40,6 +40,10 @@ class HoldFormation(Autonomy):
     desired_speed = Output(unit="m/s")
     velocity = Output("velocity_x velocity_y velocity_z", unit="m/s")
 
+    def check_values(self) -> None:
+        """Check that no lower limit is above its upper one."""
+        self.check_order("min_speed", "max_speed")
+
     def step(self, g: GroupView) -> None:
         bodies, row = g.bodies, g.rows_of(self.leader)
         if (row < 0).any():

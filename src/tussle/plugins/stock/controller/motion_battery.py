@@ -100,6 +100,10 @@ class MotionBattery(Controller):
     charged = Subscribe(ChargeAdded)
     reported = Publish(ChargePercentage, network="LocalNetwork")
 
+    def check_values(self) -> None:
+        """Check that no lower limit is above its upper one."""
+        self.check_order("charge_min", "charge_max")
+
     def active_inputs(self) -> list[str]:
         """Return the channels of the map."""
         return [f"{each.channel}_in" for each in depletions(self.depletion_map)]

@@ -28,6 +28,10 @@ class UUV6DOFLinearEnergy(Controller):
     passed = Output("throttle elevator rudder", doc="Commands passed on.")
     energy = State(unit="s", doc="Energy: seconds at full throttle.")
 
+    def check_values(self) -> None:
+        """Check that no lower limit is above its upper one."""
+        self.check_order("energy_min", "energy_max")
+
     def spawn(self, g: GroupView, rows: np.ndarray) -> None:
         """Charge the battery."""
         self.energy[rows] = clip(self.energy_initial[rows], self.energy_min[rows], self.energy_max[rows])

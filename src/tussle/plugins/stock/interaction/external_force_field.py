@@ -57,6 +57,10 @@ class ExternalForceField(Interaction):
     filters = State("u v1 v2 w1 w2", per="entity", doc="States of the gust filters, of unit variance.")
     is_known = State(dtype=bool, per="entity", doc="Whether the filters have begun.")
 
+    def check_values(self) -> None:
+        """Check that no lower limit is above its upper one."""
+        self.check_order("moment_enable_min_z", "moment_enable_max_z")
+
     def step(self, w: WorldView) -> None:
         if self.force_type == "constant":
             w.bodies.force[:] += self.constant_force[:, w.world]

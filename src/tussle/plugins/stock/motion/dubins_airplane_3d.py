@@ -38,6 +38,10 @@ class DubinsAirplane3D(MotionModel):
     desired_pitch = Input(unit="rad", doc="Elevation, nose up positive.")
     desired_roll = Input(unit="rad", doc="Bank, right wing down positive.")
 
+    def check_values(self) -> None:
+        """Check that no lower limit is above its upper one."""
+        self.check_order("speed_min", "speed_max")
+
     @row_law("x", "pos", "vel", "yaw", "climb", "roll")
     @staticmethod
     def flown(

@@ -80,6 +80,10 @@ class Multirotor(RigidBodyModel):
     motor_6 = Input(unit="rad/s", doc="Speed of the seventh rotor.")
     motor_7 = Input(unit="rad/s", doc="Speed of the eighth rotor.")
 
+    def check_values(self) -> None:
+        """Check that no lower limit is above its upper one."""
+        self.check_order("omega_min", "omega_max")
+
     @staticmethod
     def derivative(
         rigid_body: Any,

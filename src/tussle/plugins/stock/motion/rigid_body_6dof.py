@@ -43,6 +43,10 @@ class RigidBody6DOF(RigidBodyModel):
     aileron = Input(doc="Torque about the body x axis [N m], right wing down positive.")
     rudder = Input(doc="Torque about the body z axis [N m], left positive.")
 
+    def check_values(self) -> None:
+        """Check that no lower limit is above its upper one."""
+        self.check_order("min_velocity", "max_velocity")
+
     @staticmethod
     def derivative(
         rigid_body: Any,

@@ -63,6 +63,10 @@ class DepthCamera(Sensor):
         doc="Part of the scene, or entity, in each pixel.",
     )
 
+    def check_values(self) -> None:
+        """Check that no lower limit is above its upper one."""
+        self.check_order("min_range", "max_range")
+
     def step(self, g: GroupView) -> None:
         """Take an image for all rows."""
         pattern = self._pattern()

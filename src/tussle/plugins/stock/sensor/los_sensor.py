@@ -55,6 +55,10 @@ class LOSSensor(Sensor):
     los_sd = Output(unit="m", doc="Its standard deviation.")
     is_in_range = Output(doc="1 within the limits, otherwise 0.")
 
+    def check_values(self) -> None:
+        """Check that no lower limit is above its upper one."""
+        self.check_order("min_range", "max_range")
+
     def step(self, g: GroupView) -> None:
         """Measure for all rows."""
         true = self._distance(g)

@@ -111,8 +111,10 @@ class FixedWing6DOF(RigidBodyModel):
     rudder = Input(doc="Rudder [rad].")
 
     def check_values(self) -> None:
-        """Check the range of the throttle."""
+        """Check the ranges of throttle, thrust and surfaces."""
         self.check_range("throttle_input_min", "throttle_input_max")
+        for name in ("thrust", "delta_elevator", "delta_aileron", "delta_rudder"):
+            self.check_order(f"{name}_min", f"{name}_max")
 
     @staticmethod
     def derivative(

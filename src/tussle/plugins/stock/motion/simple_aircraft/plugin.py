@@ -55,6 +55,10 @@ class SimpleAircraft(MotionModel):
 
     flown = row_law("x", "pos_z", "vel", "yaw", "climb", "roll")(kernels.flown)
 
+    def check_values(self) -> None:
+        """Check that no lower limit is above its upper one."""
+        self.check_order("min_velocity", "max_velocity")
+
     def from_body(self, body: MotionBody, rows: np.ndarray) -> None:
         """Copy position, attitude and speed, clamped to the limits."""
         vx, vy, vz = body.vel[:, rows]

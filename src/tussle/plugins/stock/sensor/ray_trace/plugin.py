@@ -77,6 +77,10 @@ class RayTrace(Sensor):
     cloud = Publish(PointCloud, network="LocalNetwork")
     next_scan = State(default=-math.inf, unit="s", doc="Time of the next scan.")
 
+    def check_values(self) -> None:
+        """Check that no lower limit is above its upper one."""
+        self.check_order("min_range", "max_range")
+
     def step(self, g: GroupView) -> None:
         """Scan in the rows whose next scan is due."""
         rows = np.flatnonzero(g.t >= self.next_scan - 1e-9)
