@@ -232,6 +232,15 @@ class StressOptions(ManyGamesOptions):
             "With --probability: what games break on their way to a failure: 'always (approach(all, all, 1 m/s) > 1 m)'.",
         ),
     ] = ""
+    redraws: Annotated[
+        int,
+        option(
+            "N",
+            "With --probability, where much is decided at the start: how often, at some levels, each game is tried with another start.",
+            min=0,
+            shows_default=True,
+        ),
+    ] = 0
     particles: Annotated[
         int,
         option("N", "With --probability: games at a time, of each repetition.", min=2, shows_default=True),
@@ -276,8 +285,9 @@ class StressOptions(ManyGamesOptions):
             raise typer.BadParameter(
                 "--probability and --holds are for one mission with one set of values; not with --vary and --against, but for --importance"
             )
-        if self.guide and (not self.probability or self.importance):
-            raise typer.BadParameter("--guide needs --probability, without --importance")
+        for name in ("guide", "redraws"):
+            if getattr(self, name) and (not self.probability or self.importance):
+                raise typer.BadParameter(f"--{name} needs --probability, without --importance")
         if not self.spec:
             raise typer.BadParameter(
                 "--spec is missing: what must hold, such as 'always (distance(team 1, team 1) > 2 m)'"

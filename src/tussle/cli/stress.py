@@ -23,6 +23,7 @@ from tussle.cli.terminal import DOES_NOT_HOLD, OK, put, say, say_note
 from tussle.mission import Mission, to_xml
 from tussle.record.run_file import put_whole
 from tussle.stress.chances import Chance
+from tussle.stress.changes import absent
 from tussle.stress.confidence import Assurance, junit_xml
 from tussle.stress.estimates import Probability, Sample
 from tussle.stress.games import Played
@@ -93,7 +94,13 @@ def stress(options: StressOptions) -> int:
                 weighted = study.importance(options.games, directory=directory, **how)
                 failures = weighted.failures
             elif options.probability:
-                found = study.probability(options.particles, options.repetitions, directory=directory, **how)
+                found = study.probability(
+                    options.particles,
+                    options.repetitions,
+                    redraws=options.redraws,
+                    directory=directory,
+                    **how,
+                )
                 failures = found.failures
             else:
                 sample = study.sample(options.games, directory=directory, **how)
@@ -386,8 +393,8 @@ def show_smallest(found: SmallestGame, study: Stress, directory: Path, options: 
 
 
 def n_entities(mission: Mission) -> int:
-    """Number of entities of all blocks."""
-    return sum(block.count for block in mission.blocks)
+    """Number of entities of all blocks, but for those that are left out."""
+    return sum(block.count - len(absent(mission, block)) for block in mission.blocks)
 
 
 def n_plugins(mission: Mission) -> int:

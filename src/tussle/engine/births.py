@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from tussle.api.bodies import Bodies
+from tussle.api.context import Context
 from tussle.engine import kernels
 from tussle.engine.params import Overrides
 from tussle.errors import MissionError
@@ -85,9 +86,9 @@ class Births:
 
     may_wait = True
 
-    def __init__(self, overrides: Overrides, seeds: np.ndarray, start: float) -> None:
-        self.overrides = overrides
-        self.seeds = seeds  # keys of the context, which may change
+    def __init__(self, overrides: Overrides, context: Context, start: float) -> None:
+        self.overrides, self.context = overrides, context
+        self.seeds = context.keys  # which may change
         self.start = start
         n_blocks, n_worlds = len(overrides.mission.blocks), overrides.n_worlds
         self.keys = [np.uint64(stream_key("block", b.name)) for b in overrides.mission.blocks]
@@ -204,15 +205,17 @@ class Births:
         where = where or {}
         spec = self.overrides.mission.blocks[block]
         new.world[mine], new.block[mine], new.team[mine] = worlds, block, spec.team
+        keys = self._keys(block, worlds)
         block_values = self.overrides.block_values(spec, VALUES, worlds)
         out = new.id, new.block_index, new.pos, new.vel, new.quat, new.health, new.radius, new.mass
-        keys, counts = (self.keys[block], POSITION, HEADING), (self.next_id, self.n_born[block])
+        counts = self.next_id, self.n_born[block]
         kernels.place_newborn(
-            (self.seeds, worlds), keys, *self._placing[block], block_values, counts, out, mine.start
+            (keys, worlds), (POSITION, HEADING), *self._placing[block], block_values, counts, out, mine.start
         )
         self._first_places(block, new.pos[:, mine])
         if "pos" not in where and occupancy is not None:
-            waiting = self._separate(block, worlds, new.block_index[mine], new.pos[:, mine], occupancy)
+            places = keys, new.block_index[mine]
+            waiting = self._separate(block, worlds, places, new.pos[:, mine], occupancy)
             if len(waiting):
                 self._wait(block, worlds[waiting])
                 occupancy.waiting.append(mine.start + waiting)
@@ -221,15 +224,29 @@ class Births:
         for name, values in where.items():
             getattr(new, name)[..., mine] = values
 
+    def _keys(self, block: int, worlds: np.ndarray) -> np.ndarray:
+        """Random keys of the next entities of a block, one per item of `worlds` (sorted), (m,)."""
+        keys = self.seeds[worlds] ^ self.keys[block]
+        if not self.context.redraws:
+            return np.asarray(keys)
+        index = self.n_born[block, worlds] + np.arange(len(worlds)) - np.searchsorted(worlds, worlds)
+        return self.context.redrawn(keys, ("", ""), worlds, np.full(len(worlds), block), index)
+
     def _first_places(self, block: int, pos: np.ndarray) -> None:
         """Change the first drawn positions [m], (3, m), of entities of a block, in place. Does nothing by default."""
 
     def _separate(
-        self, block: int, worlds: np.ndarray, places: np.ndarray, pos: np.ndarray, occupancy: Occupancy
+        self,
+        block: int,
+        worlds: np.ndarray,
+        places: tuple[np.ndarray, np.ndarray],
+        pos: np.ndarray,
+        occupancy: Occupancy,
     ) -> np.ndarray:
         """Redraw the positions that an interaction rejects, one entity after another, since each occupies space.
 
-        Returns the numbers of the entities that wait for a free position, the last ones of their worlds, (k,).
+        Of the entities, `places` has the random keys and the numbers in their block, (m,) each. Returns the numbers of those that wait for
+        a free position, the last ones of their worlds, (k,).
         """
         waiting = [np.zeros(0, np.int64)]
         for world in map(int, np.unique(worlds)):
@@ -248,12 +265,13 @@ class Births:
         block: int,
         world: int,
         mine: np.ndarray,
-        places: np.ndarray,
+        places: tuple[np.ndarray, np.ndarray],
         pos: np.ndarray,
         occupancy: Occupancy,
     ) -> int:
         """Place entities of one world; returns the number of those that found a free position."""
         spec, most = self.overrides.mission.blocks[block], self.overrides.mission.limits.tries
+        keys, indices = places
         waits = self.may_wait and spec.rate is not None and spec.without_space == "wait"
         n_again = int(self._n_again[block, world]) if waits else 0
         before = occupancy.occupied(world)
@@ -272,12 +290,13 @@ class Births:
                 if attempt > MAX_TRIES or occupancy.tries[world] > most:
                     others = f", and {most:,} in all" if occupancy.tries[world] > most else ""
                     raise MissionError(
-                        f"block {spec.name!r}: no free position for entity {int(places[i]) + 1} of {spec.count} "
+                        f"block {spec.name!r}: no free position for entity {int(indices[i]) + 1} of {spec.count} "
                         f"after {attempt - 1} tries{others}; give the block more space (placement {spec.placement!r}) or fewer entities"
                     )
                 redrawn = np.empty(3)
-                seed = self.seeds[world] ^ self.keys[block]
-                kernels.scatter(seed, POSITION, places[i], first + attempt, *self._placing[block], redrawn)
+                kernels.scatter(
+                    keys[i], POSITION, indices[i], first + attempt, *self._placing[block], redrawn
+                )
                 pos[:, i] = redrawn
             taken[:, n] = pos[:, i]
             n += 1

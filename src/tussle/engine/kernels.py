@@ -35,18 +35,18 @@ def scatter(seed, stream, place, attempt, flags, shape, pos):
     pos[0], pos[1], pos[2] = drawn_place(seed, stream, place, attempt, flags, shape)
 
 
-@kernel("(U I) (u8 u8 u8) B F2 F2 (Iw Iw) (Iw Iw F2w F2w F2w Fw Fw Fw) i8")
+@kernel("(U I) (u8 u8) B F2 F2 (Iw Iw) (Iw Iw F2w F2w F2w Fw Fw Fw) i8")
 def place_newborn(worlds, keys, flags, shape, values, counts, out, first):
     """Set ids, positions, attitudes and velocities of the newborn entities, (m,), of a block.
 
-    worlds: seeds of all worlds, and the world of each newborn. keys: of the block, and of the streams of positions and headings.
+    worlds: random key and world of each newborn. keys: of the streams of positions and headings.
     flags, shape: as in `scatter`. values: heading, climb, roll [rad], speed [m/s], variance of the heading [rad^2], health, radius
     [m], mass [kg], (8, m) or (8, 1). counts: next id of each world, and number of entities of the block born so far; both are
     advanced. out: columns whose rows from `first` on are written: id, block index, position [m], velocity [m/s], (3, n), quaternion,
     (4, n), health, radius, mass.
     """
     seeds, world = worlds
-    key, position, turning = keys
+    position, turning = keys
     next_id, n_born = counts
     ids, places, pos, vel, quat, health, radius, mass = out
     last = values.shape[1] - 1
@@ -55,7 +55,7 @@ def place_newborn(worlds, keys, flags, shape, values, counts, out, first):
         ids[i], places[i] = next_id[w], n_born[w]
         next_id[w] += 1
         n_born[w] += 1
-        seed = seeds[w] ^ key
+        seed = seeds[j]
         pos[0, i], pos[1, i], pos[2, i] = drawn_place(seed, position, places[i], 0, flags, shape)
         jitter, _ = normal2(seed, turning, places[i], 0, 0, 0)
         yaw = values[0, k] + math.sqrt(values[4, k]) * jitter

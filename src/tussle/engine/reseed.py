@@ -8,14 +8,14 @@ import numpy as np
 
 from tussle.api.context import Redraw
 from tussle.engine.state import SimulationState
-from tussle.mission.rekeys import Rekeys, RekeyTarget, check_targets, checked_rekeys
+from tussle.mission.rekeys import BIRTH, Rekeys, RekeyTarget, check_targets, checked_rekeys
 from tussle.numeric.rng import stream_key
 
 DERIVED = np.uint64(stream_key("reseed"))
 
 
 def set_rekeys(state: SimulationState, worlds: Iterable[int], rekeys: Sequence[Rekeys] | None) -> None:
-    """Set the re-keys of worlds that are reset; by default those of the mission.
+    """Set the re-keys of worlds that are reset, by default those of the mission; those of births hold until the first step.
 
     Raises:
         MissionError: They are not in order of their steps, or a number or target is not allowed.
@@ -27,6 +27,12 @@ def set_rekeys(state: SimulationState, worlds: Iterable[int], rekeys: Sequence[R
         if chosen := own if rekeys is None else checked_rekeys(rekeys[i]):
             check_targets(chosen, *state.mission.draws)
             state.rekeys[world] = chosen
+            targets = [(key, RekeyTarget.parse(text)) for _, key, *texts in chosen for text in texts]
+            redraws += [
+                _redraw(state, world, key, target._replace(plugin=""))
+                for key, target in targets
+                if target.plugin == BIRTH
+            ]
 
 
 def renew_keys(state: SimulationState) -> None:
@@ -55,7 +61,11 @@ def _use(state: SimulationState, keys: np.ndarray, ahead: int) -> None:
             if step >= context.clock.step[world] + ahead:
                 break
             if target:
-                own.append(_redraw(state, world, key, RekeyTarget.parse(target[0])))
+                own += [
+                    _redraw(state, world, key, each)
+                    for each in map(RekeyTarget.parse, target)
+                    if each.plugin != BIRTH
+                ]
             else:
                 keys[world] = key
                 own.clear()

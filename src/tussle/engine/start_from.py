@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tussle.api.bodies import Bodies
+from tussle.api.context import Context
 from tussle.engine.births import Births, Occupancy
 from tussle.engine.params import Overrides
 from tussle.errors import MissionError, listed, nearest_name
@@ -22,7 +23,7 @@ class RecordedBirths(Births):
 
     Args:
         overrides: As for `Births`.
-        seeds: As for `Births`.
+        context: As for `Births`.
         start: Time of step 0 [s].
         table: Birth times and initial states.
 
@@ -30,8 +31,8 @@ class RecordedBirths(Births):
         MissionError: The table does not fit the mission's blocks.
     """
 
-    def __init__(self, overrides: Overrides, seeds: np.ndarray, start: float, table: FirstStates) -> None:
-        super().__init__(overrides, seeds, start)
+    def __init__(self, overrides: Overrides, context: Context, start: float, table: FirstStates) -> None:
+        super().__init__(overrides, context, start)
         self.table = table
         mission = overrides.mission
         block = blocks_of(table, mission.blocks)

@@ -43,7 +43,7 @@ class Parked:
     tables: dict[Any, tuple[np.ndarray, Stored]]
 
 
-def _births(mission: Mission, arguments: tuple[Overrides, np.ndarray, float]) -> Births:
+def _births(mission: Mission, arguments: tuple[Overrides, Context, float]) -> Births:
     """Return the births of a mission, according to its `compat`."""
     if not mission.compat:
         return Births(*arguments)
@@ -109,7 +109,7 @@ class SimulationState:
         context.boxes = np.array([block.box or (0.0, 0.0, 0.0) for block in mission.blocks]).reshape(-1, 3)
         self.overrides = Overrides(mission, n)
         self.overrides.set(params, np.arange(n))
-        given = self.overrides, context.keys, mission.start
+        given = self.overrides, context, mission.start
         self.births = _births(mission, given) if start_from is None else RecordedBirths(*given, start_from)
         message_bus = self.message_bus = MessageBus([p.instance_name for p in mission.networks])
         context.topic, context.fail = message_bus.topic, self.record_failure

@@ -3,6 +3,8 @@
 A game is its mission, its seed and its re-keys. One with other re-keys from step k on is a branch: the same game up to the state at the
 start of step k, and then other luck. A re-key with a target is for some draws only: those of a block, an entity, a plugin or a label.
 Of several that name a draw, the last one counts: one of the whole world ends those before it.
+
+The target left/2/birth is for what is drawn before step 0: where the entity starts, and what its plugins draw as it is born.
 """
 
 from __future__ import annotations
@@ -27,6 +29,8 @@ TAKES = (
     "it takes pairs of a step and a key, as 120:77 340:8, with steps that ascend, below 2^32, and keys below 2^64; "
     "a target behind them, as in 120:77:left/2, says whose draws alone have the key"
 )
+BIRTH = "birth"
+"""In place of a plugin, in a re-key of step 0: what is drawn for entities as the game begins."""
 TARGET = "a target is a world plugin, a block, or BLOCK/NUMBER/PLUGIN/LABEL, of which what is not meant is left empty or out"
 
 
@@ -36,7 +40,7 @@ class RekeyTarget(NamedTuple):
     Attributes:
         owner: A block, or a world plugin.
         number: An entity of the block, from 1; 0 for all.
-        plugin: Instance name of a plugin; "" for all that draw for these entities.
+        plugin: Instance name of a plugin; "" for all that draw for these entities; or `BIRTH`.
         label: A label of its draws; "" for all.
     """
 
@@ -103,12 +107,12 @@ def check_targets(rekeys: Rekeys, blocks: Mapping[str, Sequence[str]], world_plu
     Raises:
         MissionError: There is no such block or plugin.
     """
-    for _, _, *texts in rekeys:
+    for step, _, *texts in rekeys:
         for owner, number, plugin, _ in map(RekeyTarget.parse, texts):
             known: Sequence[str] = [*blocks, *world_plugins]
             wrong = owner
             if owner in blocks:
-                known, wrong = ["", *blocks[owner], *world_plugins], plugin
+                known, wrong = ["", *([] if step else [BIRTH]), *blocks[owner], *world_plugins], plugin
             elif owner in known and (number or plugin not in ("", owner)):
                 raise MissionError(
                     f"rekeys: {clipped(owner)} is a world plugin, of which there are no entities; {TARGET}"

@@ -8,30 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from tussle.api import Interaction, Messages, Network, Param, WorldView
+from tussle.api import Messages, Network, WorldView
 from tussle.api.timed_fault import TimedFault
-from tussle.mission import Mission, paths
+from tussle.mission import Block, Mission, paths
 from tussle.plugins import stock
 
 Change = tuple[str, ...]
 """("entity", block, number) with number 0 for the whole block, ("plugin", path), ("reach all", network) or ("reach none", network)."""
-
-
-class Removal(Interaction):
-    """Removes an entity of a block as soon as it is there; the ids of the others stay."""
-
-    grade = "portable"
-    block = Param("", doc="Name of the block.")
-    number = Param(0, ge=0, doc="Number of the entity, from 1; 0 for all.")
-
-    def start(self, w: WorldView) -> None:
-        """Remove it before the first step."""
-        block, number = w.context.block_names.index(self.block), self.number[w.world]
-        w.kill((w.block == block) & ((number == 0) | (w.block_index == number - 1)), "removed")
-
-    def step(self, w: WorldView) -> None:
-        """Remove it where it was born later."""
-        self.start(w)
 
 
 class Silence(Network):
@@ -52,14 +35,35 @@ def changed(mission: Mission, change: Change) -> Mission:
     """
     kind, name, *number = change
     if kind == "entity":
-        removal = Removal(block=name, number=int(number[0]), name="Removal of stress")
-        return mission.replace(interactions=(*mission.interactions, removal))
+        return without(mission, name, [int(n) for n in number if n != "0"])
     if kind == "plugin":
         return _without(mission, name)
     (place,) = (i for i, network in enumerate(mission.networks) if network.instance_name == name)
     networks = list(mission.networks)
     networks[place] = (stock.load("GlobalNetwork") if kind == "reach all" else Silence)(name=name)
     return mission.replace(networks=networks)
+
+
+def without(mission: Mission, block: str, numbers: Sequence[int]) -> Mission:
+    """A mission without entities of a block, by their numbers from 1; without numbers all of them. The draws of the others stay.
+
+    Raises:
+        TussleError: The mission is none without them.
+    """
+    kept = [p for p in mission.interactions if not is_absence(p, block)]
+    absence = stock.load("Absence")(block=block, numbers=tuple(numbers), name=f"without {block}")
+    return mission.replace(interactions=(*kept, absence))
+
+
+def absent(mission: Mission, block: Block) -> set[int]:
+    """Numbers of the entities that are left out of a block."""
+    found = [tuple(p.values["numbers"]) for p in mission.interactions if is_absence(p, block.name)]
+    return {n for numbers in found for n in range(1, block.count + 1) if n in numbers or not numbers}
+
+
+def is_absence(part: Any, block: str = "") -> bool:
+    """Whether part of a mission leaves out entities of a block, or of any."""
+    return type(part).__name__ == "Absence" and block in ("", part.values["block"])
 
 
 def _without(mission: Mission, path: str) -> Mission:

@@ -55,6 +55,7 @@ class Probability:
         game_s: Length of all games that were played [s].
         cpu_s: Their CPU time [s].
         failures: Different failing games, the worst first.
+        before: The repetition before them that found the levels at which games are moved, if they are.
         notes: What to know about the result.
     """
 
@@ -66,12 +67,13 @@ class Probability:
     game_s: float
     cpu_s: float
     failures: list[Played]
+    before: list[Repetition] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
 
     @property
     def n_games(self) -> int:
         """Games of all repetitions, branches included."""
-        return int(np.sum([r.n_games for r in self.repetitions]))
+        return int(np.sum([r.n_games for r in [*self.before, *self.repetitions]]))
 
     @property
     def n_plain(self) -> float:

@@ -7,7 +7,7 @@ compared. Windows end with the signal: `always` of no samples is +inf, `eventual
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -56,11 +56,6 @@ class Formula:
     """A formula; `robustness` is its value at the first sample."""
 
     @property
-    def terms(self) -> Iterator[str]:
-        """Names of the terms that it compares."""
-        raise AssertionError
-
-    @property
     def delay(self) -> int:
         """Samples after which its value at the first sample is known."""
         raise AssertionError
@@ -99,10 +94,6 @@ class Above(Formula):
     is_late: bool = False
 
     @property
-    def terms(self) -> Iterator[str]:
-        yield self.term
-
-    @property
     def delay(self) -> int:
         return MAX_DELAY if self.is_late else 0
 
@@ -115,10 +106,6 @@ class Not(Formula):
     """The other does not hold."""
 
     inner: Formula
-
-    @property
-    def terms(self) -> Iterator[str]:
-        yield from self.inner.terms
 
     @property
     def delay(self) -> int:
@@ -134,11 +121,6 @@ class Every(Formula):
 
     parts: tuple[Formula, ...]
     is_any: bool = False
-
-    @property
-    def terms(self) -> Iterator[str]:
-        for part in self.parts:
-            yield from part.terms
 
     @property
     def delay(self) -> int:
@@ -175,10 +157,6 @@ class Window(Formula):
     first: int = 0
     last: int | None = None
     is_any: bool = False
-
-    @property
-    def terms(self) -> Iterator[str]:
-        yield from self.inner.terms
 
     @property
     def delay(self) -> int:
@@ -223,25 +201,26 @@ class UntilHolds(Formula):
     last: int | None = None
 
     @property
-    def terms(self) -> Iterator[str]:
-        yield from self.left.terms
-        yield from self.right.terms
-
-    @property
     def delay(self) -> int:
         inner = max(self.left.delay, self.right.delay)
         return MAX_DELAY if self.last is None else min(MAX_DELAY, inner + self.last)
 
     def over(self, traces: Traces) -> np.ndarray:
         left, right = np.broadcast_arrays(self.left.over(traces), self.right.over(traces))
-        n = len(left)
-        out, held = np.full(n, -np.inf), np.full(n, np.inf)
-        for shift in range(n if self.last is None else min(n, self.last + 1)):
-            m = n - shift
-            if shift >= self.first:
-                out[:m] = np.maximum(out[:m], np.minimum(right[shift:], held[:m]))
-            held[:m] = np.minimum(held[:m], left[shift:])
-        return out
+        n, width = len(left), 1
+        last = n - 1 if self.last is None else min(self.last, n - 1)
+        if last < self.first:
+            return np.full(n, -np.inf)
+
+        def later(by: int) -> np.ndarray:  # what is found from a later sample on, if `left` holds until then
+            held = windowed(left, 0, by - 1, np.minimum, np.inf)
+            return np.minimum(held, np.concatenate([found[by:], np.full(min(by, n), -np.inf)]))
+
+        found = right  # of a window from the sample on, so many samples wide
+        while width <= last - self.first:
+            by = min(width, last - self.first + 1 - width)
+            found, width = np.maximum(found, later(by)), width + by
+        return later(self.first) if self.first else found
 
 
 def records(known: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -5,10 +5,10 @@ from __future__ import annotations
 import json
 import math
 import os
-from bisect import bisect_left
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
+from functools import reduce
 from pathlib import Path
 from typing import Any, Self
 
@@ -22,7 +22,7 @@ from tussle.batch.tasks import BatchRun, Finished
 from tussle.documents import Document, json_text, read_text
 from tussle.errors import BatchError
 from tussle.mission import Mission
-from tussle.mission.rekeys import Rekeys, rekeys_text
+from tussle.mission.rekeys import BIRTH, Rekey, Rekeys, RekeyTarget, rekeys_text
 from tussle.record.run_file import plain, put_whole
 from tussle.stress.changes import Change
 from tussle.stress.monitor import Verdict, Watching
@@ -68,14 +68,26 @@ class StressGame:
 
     def branch(self, step: int, key: int) -> StressGame:
         """The same game up to the state at the start of a step, and from there on with other luck."""
-        kept = self.rekeys[: bisect_left(self.rekeys, (step,))]
-        return replace(self, rekeys=(*kept, (step, key)))
+        return self._with(step, key, [r for r in self.rekeys if r[0] < step or _is_birth(r)])
+
+    def reborn(self, key: int, block: str, number: int) -> StressGame:
+        """The same game, in which an entity of a block, from 1, starts elsewhere; what it draws later stays."""
+        target = str(RekeyTarget(block, number, BIRTH))
+        return self._with(0, key, [r for r in self.rekeys if r[2:] != (target,)], target)
+
+    def _with(self, step: int, key: int, kept: Sequence[Rekey], *target: str) -> StressGame:
+        rekeys = sorted([*kept, (step, key, *target)], key=lambda r: (r[0], *r[2:]))
+        return replace(self, rekeys=tuple(rekeys))
 
     def redrawn(self, step: int, key: int, target: str) -> StressGame:
         """The same game, in which the draws of a target alone have another key from a step on."""
         later = [each[0] for each in self.rekeys if each[0] > step and len(each) == 2]
-        again = [(each, key, target) for each in (step, *later)]
-        return replace(self, rekeys=tuple(sorted((*self.rekeys, *again), key=lambda r: (r[0], *r[2:]))))
+        first = self._with(step, key, self.rekeys, target)
+        return reduce(lambda game, each: game._with(each, key, game.rekeys, target), later, first)
+
+
+def _is_birth(rekey: Rekey) -> bool:
+    return len(rekey) == 3 and RekeyTarget.parse(rekey[2]).plugin == BIRTH
 
 
 @dataclass(frozen=True)

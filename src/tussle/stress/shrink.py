@@ -10,6 +10,7 @@ from typing import Any
 from tussle.engine.simulation import Simulation
 from tussle.errors import ParameterError, TussleError
 from tussle.mission import Block, Mission, paths, to_xml
+from tussle.stress.changes import absent, is_absence, without
 from tussle.stress.games import Played
 from tussle.stress.monitor import Verdict, Watching
 
@@ -92,13 +93,23 @@ def _smaller(mission: Mission, verdict: Verdict) -> Iterator[Mission | None]:
     if step is not None and (end := mission.start + (step + 1) * mission.dt) < mission.end:
         yield _valid(mission.replace, end=float(f"{end:.12g}"))
     blocks = list(mission.blocks)
-    for i in range(len(blocks)):
-        yield _valid(mission.replace, blocks=blocks[:i] + blocks[i + 1 :])
     for i, block in enumerate(blocks):
-        for count in sorted({1, block.count // 2, block.count - 1} - {0, block.count}):
-            yield _valid(_with_block, mission, i, count=count)
+        others = [p for p in mission.interactions if not is_absence(p, block.name)]
+        yield _valid(mission.replace, blocks=blocks[:i] + blocks[i + 1 :], interactions=others)
+    for i, block in enumerate(blocks):
+        gone = absent(mission, block)
+        here = sorted(set(range(1, block.count + 1)) - gone)
+        if here and here[-1] < block.count:
+            yield _valid(_with_block, mission, i, count=here[-1])
+        size = len(here) // 2
+        while size:
+            for k in range(0, len(here), size):
+                yield _valid(without, mission, block.name, sorted({*gone, *here[k : k + size]}))
+            size //= 2
     for name in ("interactions", "metrics", "networks", "rekeys"):
         for rest in _without_one(getattr(mission, name)):
+            if any(is_absence(p) for p in {*getattr(mission, name)} - {*rest}):  # who is left out stays out
+                continue
             smaller = _valid(mission.replace, **{name: rest})
             # A mission adds the networks that it cannot be without.
             if smaller is not None and len(getattr(smaller, name)) == len(rest):

@@ -7,6 +7,13 @@ algorithms"), section 3. The score of a game at a step is its robustness as know
 A repetition plays n games. In each round, those that stayed farthest from failure are replaced by branches of others: each is the game of
 a random survivor up to the first step at which it was nearer to failure than the level of the round, and then has other luck. A branch is
 a game of its own, with a seed and re-keys; its states up to the branch are computed again, bit for bit.
+
+Where starts decide, games are moved too (`Redraws`): at levels that are fixed before, each game is proposed with other numbers for the
+start of one entity, and stays as it was if it would not come as near as the level. That leaves the law of the games beyond the level as
+it is, since the numbers are independent of each other and one is drawn again whatever it was (a Metropolis step; Cérou et al. 2012,
+"Sequential Monte Carlo for rare event estimation", section 3). Afterwards each game has other luck from the first step beyond the level
+on, as what came later has been looked at. At a fixed level, the mean of the estimate of each function of the games is exact (Bréhier et
+al. 2016, theorem 3.2), so it stays exact with the moves. Levels that depended on the games that are moved would have a bias.
 """
 
 from __future__ import annotations
@@ -23,10 +30,15 @@ from tussle.numeric import exp, log, total
 from tussle.numeric.rng import stream_key, uniform
 from tussle.stress.games import Played, StressGame
 
-CHOICE = stream_key("stress", "survivor")
+CHOICE, MOVED = stream_key("stress", "survivor"), stream_key("stress", "moved")
 
 MIN_PROBABILITY = 1e-15
 """Below it a repetition ends as if no game had come nearer: where branches do not differ, levels creep on without end."""
+
+MAX_MOVED = 8
+"""Entities that one move lets start elsewhere."""
+PASSING = 0.1
+"""Part of the games beyond one level of moves that reaches the next."""
 
 Play = Callable[[Sequence[StressGame]], Sequence[Played]]
 
@@ -59,8 +71,53 @@ class Repetition:
         return self.probability == 0.0
 
 
+@dataclass(frozen=True)
+class Redraws:
+    """Moves of games to other starts.
+
+    Attributes:
+        levels: Scores at which they are made, descending; fixed, whatever the games that are moved.
+        starts: Block and number of each entity that may start elsewhere.
+        n: How often each game is moved at a level.
+    """
+
+    levels: Sequence[float]
+    starts: Sequence[tuple[str, int]]
+    n: int
+
+    def proposal(self, game: StressGame, name: str) -> StressGame:
+        """The same game with other starts of some entities: mostly of one or few."""
+        key = stream_key("stress", "start", name)
+        number, *places = uniform(key, MOVED, np.arange(MAX_MOVED + 1), np.zeros(MAX_MOVED + 1, np.int64))[
+            0
+        ].tolist()
+        most = min(MAX_MOVED, max(1, len(self.starts) // 4))
+        for i, place in enumerate(places[: int((most + 1) ** number)]):
+            game = game.reborn((key + i) % 2**64, *self.starts[int(place * len(self.starts))])
+        return game
+
+    @classmethod
+    def of(cls, pilot: Repetition, starts: Sequence[tuple[str, int]], n: int) -> Redraws:
+        """Moves at levels that by a repetition without moves a part of `PASSING` of the games passes from one to the next."""
+        levels, passing = list[float](), PASSING
+        reached = np.cumprod(1.0 - np.array(pilot.shares))
+        for level, part in zip(pilot.levels, reached.tolist(), strict=True):
+            if part <= passing:
+                levels.append(level)
+                passing = part * PASSING
+        return cls(levels, starts, n)
+
+
+NO_REDRAWS = Redraws((), (), 0)
+
+
 def repetition(
-    number: int, n: int, n_replaced: int, first_seed: int, result: Repetition
+    number: int,
+    n: int,
+    n_replaced: int,
+    first_seed: int,
+    result: Repetition,
+    redraws: Redraws = NO_REDRAWS,
 ) -> Generator[list[StressGame], Sequence[Played], None]:
     """One run of the algorithm: yields games, and is sent how they went.
 
@@ -70,14 +127,18 @@ def repetition(
         n_replaced: Games that are replaced in a round, or more where there are ties.
         first_seed: Seed of the first game of repetition 0.
         result: Receives what comes of it.
+        redraws: How games are moved to other starts.
     """
     games = [StressGame((first_seed + number * n + i) % 2**64) for i in range(n)]
     played = list((yield games))
     score = np.array([p.verdict.score for p in played])
     result.n_games = n
-    round_ = 0
+    round_, fixed = 0, list(redraws.levels)
     while True:
         level = float(np.sort(score)[n - n_replaced])
+        is_fixed = bool(fixed) and level <= fixed[0]
+        if is_fixed:
+            level = fixed.pop(0)
         if level < 0.0:
             break
         is_lost = score >= level
@@ -90,35 +151,57 @@ def repetition(
             return
         draws = uniform(first_seed % 2**64, CHOICE, lost, np.full(len(lost), round_), number)[0]
         parents = survivors[np.minimum((draws * len(survivors)).astype(np.int64), len(survivors) - 1)]
-        branches = []
-        for place, parent in zip(lost.tolist(), parents.tolist(), strict=True):
-            step = played[parent].verdict.first_below(level)
-            assert step is not None
-            key = stream_key("stress", "branch", f"{first_seed} {number} {round_} {place}")
-            branches.append(played[parent].game.branch(step, key))
-        found = yield branches
-        score[lost] = [branch.verdict.score for branch in found]
-        for place, branch in zip(lost.tolist(), found, strict=True):
+        names = [f"{first_seed} {number} {round_} {place}" for place in range(n)]
+        branches = yield [_beyond(played[i], level, names[k]) for k, i in zip(lost, parents, strict=True)]
+        for place, branch in zip(lost.tolist(), branches, strict=True):
             played[place] = branch
         result.n_games += len(lost)
+        if is_fixed:
+            for move in range(redraws.n):
+                tried = yield [
+                    redraws.proposal(p.game, f"{name} {move}") for p, name in zip(played, names, strict=True)
+                ]
+                played = [
+                    new if new.verdict.score < level else old for old, new in zip(played, tried, strict=True)
+                ]
+            played = list(
+                (yield [_beyond(p, level, f"{name} moved") for p, name in zip(played, names, strict=True)])
+            )
+            result.n_games += (redraws.n + 1) * n
+        score = np.array([p.verdict.score for p in played])
         round_ += 1
     result.failures = [p for p in played if p.verdict.has_failed]
     result.n_ancestors = len({p.game.seed for p in played})
     result.probability *= len(result.failures) / n
 
 
-def split(play: Play, n: int, n_replaced: int, repetitions: int, first_seed: int) -> list[Repetition]:
+def _beyond(played: Played, level: float, name: str) -> StressGame:
+    """The same game up to the first step beyond a level, and then with other luck."""
+    step = played.verdict.first_below(level)
+    assert step is not None
+    return played.game.branch(step, stream_key("stress", "branch", name))
+
+
+def split(
+    play: Play,
+    n: int,
+    n_replaced: int,
+    numbers: Sequence[int],
+    first_seed: int,
+    redraws: Redraws = NO_REDRAWS,
+) -> list[Repetition]:
     """Run the algorithm several times; the games of a round of all of them are played together.
 
     Args:
         play: Plays games.
         n: Games at a time, of each repetition.
         n_replaced: Games that are replaced in a round.
-        repetitions: How often.
-        first_seed: Seed of the first game.
+        numbers: Numbers of the repetitions.
+        first_seed: Seed of the first game of repetition 0.
+        redraws: How games are moved to other starts.
     """
-    results = [Repetition(number) for number in range(repetitions)]
-    under_way = {r.number: repetition(r.number, n, n_replaced, first_seed, r) for r in results}
+    results = [Repetition(number) for number in numbers]
+    under_way = {r.number: repetition(r.number, n, n_replaced, first_seed, r, redraws) for r in results}
     asked = {number: next(one) for number, one in under_way.items()}
     while asked:
         played = list(play([game for games in asked.values() for game in games]))

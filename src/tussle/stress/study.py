@@ -39,7 +39,7 @@ from tussle.stress.results import record_game, write_result, write_why
 from tussle.stress.search import FailureSearch, label, search, searcher
 from tussle.stress.shrink import MAX_SHRINK_GAMES, SmallestGame, shrink
 from tussle.stress.specification import Function, Specification, columns_of
-from tussle.stress.splitting import interval, split
+from tussle.stress.splitting import NO_REDRAWS, Redraws, Repetition, interval, split
 from tussle.stress.why import Explanation, Why
 
 MANY = 0.5
@@ -296,6 +296,7 @@ class Stress:
         particles: int = 100,
         repetitions: int = 20,
         replaced: float = 0.25,
+        redraws: int = 0,
         directory: str | Path | None = None,
         **how: Any,
     ) -> Probability:
@@ -305,6 +306,7 @@ class Stress:
             particles: Games at a time, of each repetition.
             repetitions: Independent repetitions, from which the interval follows.
             replaced: Part of the games that a round replaces.
+            redraws: How often, at some levels, each game is tried with another start of one entity, see `tussle.stress.splitting`.
             directory: Where games are kept, and from where the same study goes on; None keeps them in memory.
             how: `executor`, `processes`, `stack` and `on_game`, as for `GamePlayer`.
 
@@ -315,18 +317,26 @@ class Stress:
         self._check_plain("probability")
         check_argument("particles", particles, Whole(2, 10**6))
         check_argument("repetitions", repetitions, Whole(2, 10**4))
+        check_argument("redraws", redraws, Whole(0, 10**3))
         if not 0.0 < replaced < 1.0:
             raise ParameterError(f"replaced = {replaced!r} is not allowed; it takes a number between 0 and 1")
         self.check()
         with self._ledger(directory) as ledger:
             player = self._player(ledger, how)
             n_replaced = max(1, round(replaced * particles))
-            found = split(_Random(player.play), particles, n_replaced, repetitions, self.first_seed)
+            play, before, moves = _Random(player.play), list[Repetition](), NO_REDRAWS
+            if redraws:
+                starts = [(b.name, i + 1) for b in self.mission.blocks if not b.rate for i in range(b.count)]
+                before = split(play, particles, n_replaced, [repetitions], self.first_seed)
+                moves = Redraws.of(before[0], starts, redraws)
+            found = split(play, particles, n_replaced, range(repetitions), self.first_seed, moves)
             value, low, high = interval([r.probability for r in found])
             if value == 0.0:  # none of the first games failed either
                 high = 1.0 - 0.05 ** (1.0 / (particles * repetitions))
             failures = worst_first(p for r in found for p in r.failures)
-            result = Probability(value, low, high, found, particles, player.game_s, player.cpu_s, failures)
+            result = Probability(
+                value, low, high, found, particles, player.game_s, player.cpu_s, failures, before
+            )
             result.notes = list(self._notes(result))
             self._write(
                 ledger,
@@ -510,10 +520,10 @@ class Stress:
                 "and branches do not come nearer by other luck"
             )
         ancestors = [r.n_ancestors for r in repetitions if not r.is_extinct]
-        if ancestors and np.median(ancestors) < MIN_ANCESTORS:
+        if ancestors and np.median(ancestors) < MIN_ANCESTORS and not found.before:
             notes.append(
                 f"the failing games of a repetition descend from {np.median(ancestors):.0f} of its {found.n} first games: what is decided "
-                "at the start of a game is seen through few of them; more --particles make the result surer"
+                "at the start of a game is seen through few of them; --redraws tries other starts, more --particles make the result surer"
             )
         return notes
 

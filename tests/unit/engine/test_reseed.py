@@ -11,6 +11,7 @@ from tussle.api import Autonomy, Interaction, Output, State
 from tussle.batch import Batch, InProcess
 from tussle.errors import MissionError, ParameterError
 from tussle.mission import read_mission, to_python, to_xml
+from tussle.stock import SimpleCollision
 
 
 class Draws(Autonomy):
@@ -264,6 +265,61 @@ def test_a_rekey_with_a_target_changes_its_draws_alone(target, entities, lots, c
     assert stack.state.context.redraws == []
 
 
+class Born(Autonomy):
+    """Keeps what it drew when it was born, and the draw of its step."""
+
+    grade = "portable"
+    first = State()
+    drawn = State()
+    velocity = Output("velocity_x velocity_y velocity_z", unit="m/s")
+
+    def spawn(self, g, rows):
+        self.first[rows] = g.uniform("first")[rows]
+
+    def step(self, g):
+        self.drawn[:] = g.uniform("draw")
+
+
+def born(sim):
+    """Places, headings, what was drawn at the birth, and the draws of two steps, of the entities of `swarm` in the last world."""
+    pos, vel, first = (sim.read(f"swarm.{name}")[0][-1] for name in ("pos", "vel", "Born.first"))
+    drawn = []
+    for _ in range(2):
+        sim.step()
+        drawn.append(sim.read("swarm.Born.drawn")[0][-1])
+    return np.column_stack([pos[:, :2], vel[:, :2], first]), np.array(drawn)
+
+
+@pytest.mark.parametrize(("target", "entities"), [("swarm/2/birth", [1]), ("swarm//birth", [0, 1, 2])])
+def test_a_rekey_of_births_changes_starts_alone(target, entities, tmp_path):
+    """Alone, in a stack, and beside a branch at step 0; later draws stay, also where others need room."""
+    swarm = block(
+        "swarm", count=3, autonomy=Born(), variance=(50.0, 50.0, 0.0), scatter_first=True, heading_variance=1.0, speed=2.0,
+    )  # fmt: skip
+    apart = SimpleCollision(startup_collision_range=8.0, startup_collisions_only=True)
+    game = mission(block(autonomy=Draws(), position=(500.0, 0.0, 0.0)), swarm, interactions=[apart])
+    start, drawn = born(Simulation(game, [1]))
+    changed = []
+    for key in (9, 10, 11, 12):
+        stack = Simulation(game, [4, 5, 1])
+        stack.step(3)
+        stack.reset([0, 2], [4, 1], rekeys=[(), ((0, 7), (0, key, target))])
+        found, luck = born(stack)
+        own = Simulation(game.replace(rekeys=((0, key, target),)), [1])
+        again, same = born(own)
+        np.testing.assert_array_equal(found, again)
+        np.testing.assert_array_equal(same, drawn)
+        assert (luck != drawn).all()
+        assert own.state.context.redraws == []
+        changed.append((found != start).any(axis=1))
+        assert (found[entities] != start[entities]).all()
+        assert (found[:, 4] != start[:, 4]).tolist() == [i in entities for i in range(3)]
+    assert changed[0].tolist() == [i in entities for i in range(3)]
+    file = tmp_path / "game.xml"
+    file.write_text(to_xml(game.replace(rekeys=((0, 9, target),)), 1).replace("Born<", "Draws<"))
+    assert f"0:9:{target}" in file.read_text()
+
+
 def test_targets_of_a_mission_file(tmp_path):
     game = read(tmp_path, ' rekeys="4:7 4:8:team_1/1 4:8:team_1/2 9:1"').mission
     assert game.rekeys == ((4, 7), (4, 8, "team_1/1"), (4, 8, "team_1/2"), (9, 1))
@@ -278,6 +334,7 @@ def test_targets_of_a_mission_file(tmp_path):
         ([(4, 7, "b")], "there is no block or plugin 'b'; "),
         ([(4, 7, "a//Drawz")], "there is no block or plugin 'Drawz' .did you mean 'Draws'"),
         ([(4, 7, "WorldDraws/2")], "WorldDraws is a world plugin, of which there are no entities"),
+        ([(4, 7, "a/1/birth")], "there is no block or plugin 'birth'"),
         ([(4, 7, "a/x")], "target 'a/x' of a re-key is not allowed"),
         ([(4, 7, "")], "target '' of a re-key is not allowed"),
         ([(4, 7, "a/1/Draws/draw/more")], "is not allowed; a target is a world plugin"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 from test_study import PLUGIN
 
@@ -11,6 +12,7 @@ from tussle.errors import ParameterError
 from tussle.mission import read_mission, to_xml
 from tussle.stock import CPA, GPS, ActuatorFault, SingleIntegrator
 from tussle.stress import Monitor, Specification, Stress
+from tussle.stress.changes import absent
 
 TEXT = "always (distance(left, right) > 1 m)"
 
@@ -60,6 +62,27 @@ def test_what_has_no_part_in_a_failure_is_left_out():
     assert (left.autonomy[0].speed, right.autonomy[0].speed, right.position) == (1.0, -1.0, (0.0, 5.0, 0.0))
     assert found.mission.end == pytest.approx(2.1)  # 5 m less 1 m at 2 m/s, and a step
     assert -0.2 < found.robustness < 0.0
+
+
+def test_of_two_crowds_the_two_that_meet_are_left():
+    """Where they start and what they draw depends on those that are left out."""
+    crowd = {"count": 8, "placement": "uniform", "scatter_first": True, "motion": SingleIntegrator()}
+    blocks = [
+        Block(name="north", position=(0, -12, 0), half_width=(15, 3, 0), autonomy=Cruise(speed=1.0), **crowd),
+        Block(name="south", position=(0, 12, 0), half_width=(15, 3, 0), autonomy=Cruise(speed=-1.0), **crowd),
+    ]
+    study = Stress(Mission(blocks=blocks, end=20, dt=0.1), "always (distance(north, south) > 0.3 m)")
+    game = next(p for p in study.sample(20, processes=1).games if p.verdict.has_failed)
+    found = study.smallest(game)
+    assert found.is_smallest
+    assert [b.count - len(absent(found.mission, b)) for b in found.mission.blocks] == [1, 1]
+    sim = Simulation(found.mission, found.seed)
+    sim.step()
+    whole = Simulation(study.mission, found.seed)
+    for name in ("north", "south"):
+        place, is_there = sim.read(f"{name}.pos")
+        assert (np.abs(whole.read(f"{name}.pos")[0][0] - place[is_there][0]).max(axis=1) < 0.11).sum() == 1
+    assert to_xml(found.mission, found.seed).count("Absence") <= 2
 
 
 def test_a_fault_that_the_failure_needs_stays():

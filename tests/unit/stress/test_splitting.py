@@ -6,22 +6,49 @@ import math
 
 import numpy as np
 import pytest
-from walks import NORMAL, PROCESSES, brownian, chain, gap, playing
+from walks import ENTITIES, NORMAL, PROCESSES, begun, brownian, chain, gap, playing
 
 from tussle.numeric.kernel import collecting_later
 from tussle.stress import Played, Verdict
 from tussle.stress.formulas import guided
-from tussle.stress.splitting import interval, split
+from tussle.stress.splitting import Redraws, interval, split
 
 
 @pytest.mark.parametrize("process", PROCESSES)
 @pytest.mark.parametrize("p", [1e-2, 1e-4])
 def test_the_mean_of_estimates_is_the_exact_probability(process, p):
     play, exact = process(p)
-    found = [r.probability for r in split(play, 40, 10, 40, 1)]
+    found = [r.probability for r in split(play, 40, 10, range(40), 1)]
     error = np.std(found, ddof=1) / math.sqrt(len(found))
     assert abs(np.mean(found) - exact) < 4.0 * error
     assert error < 0.4 * exact
+
+
+@pytest.mark.parametrize("levels", [(1.5, 1.0, 0.5), (2.0, 1.6, 1.2, 0.8, 0.6, 0.4, 0.2)])
+def test_moves_to_other_starts_change_no_probability(levels):
+    """At any levels, also where they are too few to help."""
+    play, exact = begun(1e-2)
+    found = [r.probability for r in split(play, 40, 10, range(60), 1, Redraws(levels, ENTITIES, 2))]
+    error = np.std(found, ddof=1) / math.sqrt(len(found))
+    assert abs(np.mean(found) - exact) < 4.0 * error
+    assert error < 0.25 * exact
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("p", [1e-2, 1e-4])
+def test_intervals_cover_a_probability_that_the_start_decides(p):
+    """90 to 99 of 100 studies, with moves; without them they do not."""
+    play, exact = begun(p)
+    (before,) = split(play, 100, 25, [1000], 1)
+    moves = Redraws.of(before, ENTITIES, 3)
+    repetitions = split(play, 100, 25, range(1000), 1, moves)
+    estimates = [r.probability for r in repetitions]
+    covered = [interval(estimates[10 * k : 10 * k + 10]) for k in range(100)]
+    n = sum(low <= exact <= high for _, low, high in covered)
+    print(
+        f"begun {p:.2g}: {n} of 100 intervals cover; {np.mean([r.n_games for r in repetitions]):.0f} games in a repetition"
+    )
+    assert 90 <= n <= 100
 
 
 def guided_brownian(p, lead):
@@ -46,7 +73,7 @@ def test_a_guide_changes_no_probability(lead):
     from scipy.stats import norm
 
     exact = 2.0 * norm.sf(norm.isf(p / 2) + shift)
-    found = [r.probability for r in split(guided_brownian(p, lead), 40, 10, 40, 1)]
+    found = [r.probability for r in split(guided_brownian(p, lead), 40, 10, range(40), 1)]
     error = np.std(found, ddof=1) / math.sqrt(len(found))
     assert abs(np.mean(found) - exact) < 4.0 * error + 0.02 * exact
     assert error < 0.4 * exact
@@ -70,7 +97,7 @@ def test_a_repetition_whose_branches_are_all_alike_ends():
         scores = [1.0 - 1e-3 * (len(rounds) + i / len(games)) for i in range(len(games))]
         return [Played(g, Verdict(s, [0], [s]), 1.0, 0.0, "") for g, s in zip(games, scores, strict=True)]
 
-    (found,) = split(play, 20, 5, 1, 1)
+    (found,) = split(play, 20, 5, [0], 1)
     assert found.is_extinct
     assert 20 < len(rounds) < 200
 
@@ -83,7 +110,7 @@ def test_intervals_cover_the_exact_probability(process, p):
     play, exact = process(p)
     n = {chain: 200, gap: 50}.get(process, 100)
     with collecting_later():  # millions of objects stay, and none is garbage
-        repetitions = split(play, n, n // 4, 2000, 1)
+        repetitions = split(play, n, n // 4, range(2000), 1)
     covered = 0
     for k in range(100):
         _, low, high = interval([r.probability for r in repetitions[20 * k : 20 * k + 20]])
@@ -100,7 +127,7 @@ def test_a_repetition_counts_its_games_and_their_ancestors():
         asked.extend(games)
         return play(games)
 
-    found = split(counting, 30, 6, 3, 5)
+    found = split(counting, 30, 6, range(3), 5)
     assert sum(r.n_games for r in found) == len(asked) == len(set(asked))
     for r in found:
         assert r.levels == sorted(r.levels, reverse=True)
@@ -115,8 +142,8 @@ def test_a_repetition_counts_its_games_and_their_ancestors():
 
 def test_repetitions_do_not_depend_on_how_many_there_are():
     play, _ = chain(1e-2)
-    many = split(play, 20, 5, 4, 1)
-    assert [r.probability for r in split(play, 20, 5, 2, 1)] == [r.probability for r in many[:2]]
+    many = split(play, 20, 5, range(4), 1)
+    assert [r.probability for r in split(play, 20, 5, [1, 0], 1)] == [r.probability for r in many[1::-1]]
 
 
 def test_where_no_game_comes_nearer_the_repetition_dies_out():
@@ -125,7 +152,7 @@ def test_where_no_game_comes_nearer_the_repetition_dies_out():
     def blind(games):
         return [p.__class__(p.game, p.verdict.__class__(1.0, [0], [1.0]), 1.0, 0.0, "") for p in play(games)]
 
-    (found,) = split(blind, 10, 2, 1, 1)
+    (found,) = split(blind, 10, 2, [0], 1)
     assert (found.is_extinct, found.levels, found.shares, found.failures) == (True, [1.0], [1.0], [])
 
 

@@ -183,6 +183,31 @@ def test_a_guide_finds_the_same_probability(found):
     assert again.verdict.first_below(0.0) == worst.verdict.first_below(0.0)
 
 
+def test_moves_to_other_starts_are_games_like_all_others(tmp_path):
+    """The same in any stack and after a kill; a failing one is a mission that fails, with its start in the file."""
+    where = {
+        f"left.{name}": value for name, value in (("variance", "9 9 0"), ("scatter_first", True), ("z", 0))
+    }
+    one = Stress(EXAMPLE / "pads.xml", TEXT, plugin_files=[PLUGIN], settings={"run.end": 3, **where})
+    result = one.probability(16, 2, redraws=1, directory=tmp_path / "out")
+    games = tmp_path / "out/games.jsonl"
+    whole = games.read_text()
+    assert "left/1/birth" in whole
+    games.write_text(whole[: len(whole) // 2])
+    again = one.probability(16, 2, redraws=1, directory=tmp_path / "out", stack=3)
+    assert again.repetitions == result.repetitions
+    assert len(games.read_text().splitlines()) == whole.count("\n")
+    moved = next(p.game for p in result.failures if any("birth" in str(r) for r in p.game.rekeys))
+    file = tmp_path / "moved.xml"
+    file.write_text(one.failing_mission(moved))
+    loaded = read_mission(file, plugin_files=[PLUGIN])
+    sim = Simulation(loaded.mission, loaded.seed)
+    monitor = Monitor(Specification.parse(TEXT, loaded.mission), sim)
+    sim.run()
+    assert monitor.robustness()[0] < 0.0
+    assert result.n_games == sum(r.n_games for r in [*result.before, *result.repetitions])
+
+
 def test_a_guide_of_the_end_alone_or_of_a_search_is_of_no_use():
     late = study(guide="lost[1] < 1").probability(4, 2)
     assert "nothing is known of this specification before a game ends" in late.notes[0]

@@ -11,14 +11,23 @@ from tussle.stress import Played, Verdict
 
 STREAM = stream_key("walk")
 NORMAL, UNIFORM = 0, 1  # kinds of draws
+START = 2  # normal numbers of the entities at the start
+ENTITIES = [("walker", i + 1) for i in range(4)]
 CHUNK = 2000  # games whose arrays fit the processor's cache
 
 
 def playing(path, steps):
-    """A function that plays games of a process: path(draw, n) returns robustness, (n, steps + 1), draw(NORMAL) numbers, (n, steps)."""
+    """A function that plays games of a process: path(draw, n) returns robustness, (n, steps + 1).
+
+    draw(NORMAL) returns numbers, (n, steps), and draw(START) those of entities, (n, len(ENTITIES)).
+    """
     at = np.tile(np.arange(steps), CHUNK)
 
-    def draw(kind, keys):
+    def draw(kind, keys, born):
+        if kind == START:
+            return normal(born.ravel(), STREAM + START, np.tile(np.arange(len(ENTITIES)), len(born)), 0)[
+                0
+            ].reshape(born.shape)
         numbers = {NORMAL: normal, UNIFORM: uniform}[kind](keys.ravel(), STREAM + kind, 0, at[: keys.size])
         return numbers[0].reshape(keys.shape)
 
@@ -27,10 +36,15 @@ def playing(path, steps):
         for first in range(0, len(games), CHUNK):
             some = games[first : first + CHUNK]
             keys = np.repeat(np.array([game.seed for game in some], np.uint64)[:, None], steps, axis=1)
-            for row, game in zip(keys, some, strict=True):
-                for step, key in game.rekeys:
-                    row[step:] = key
-            robustness = np.minimum.accumulate(path(partial(draw, keys=keys), len(some)), axis=1)
+            born = np.repeat(keys[:, :1], len(ENTITIES), axis=1)
+            for row, own, game in zip(keys, born, some, strict=True):
+                for step, key, *target in game.rekeys:
+                    if target:
+                        assert (step, target[0][-6:]) == (0, "/birth")
+                        own[int(target[0].split("/")[1]) - 1] = key
+                    else:
+                        row[step:] = key
+            robustness = np.minimum.accumulate(path(partial(draw, keys=keys, born=born), len(some)), axis=1)
             found += _played(steps, some, robustness)
         return found
 
@@ -141,6 +155,37 @@ def gap(p):
         return np.concatenate([np.full((n, 1), g), g + np.cumsum(moves, axis=1)], axis=1) - 1.0
 
     return playing(path, steps), float(meets(g))
+
+
+def begun(p, part=0.9):
+    """First passage of Brownian motion whose start, the sum of numbers of four entities, has a part of the variance: by quadrature."""
+    from scipy.integrate import quad
+    from scipy.optimize import brentq
+    from scipy.stats import norm
+
+    steps, s, r = 30, np.sqrt(part), np.sqrt(1.0 - part)
+
+    def passage(b):
+        below = quad(
+            lambda x: norm.pdf(x / s) / s * 2.0 * norm.sf((b - x) / r),
+            b - 12.0 * r,
+            b,
+            epsabs=0.0,
+            epsrel=1e-9,
+            limit=200,
+        )[0]
+        return below + norm.sf(b / s)
+
+    b = brentq(lambda b: np.log(passage(b) / p), 0.5, 9.0)
+
+    def path(draw, n):
+        dx = draw(NORMAL) * r / np.sqrt(steps)
+        first = s * draw(START).sum(axis=1)[:, None] / np.sqrt(len(ENTITIES))
+        x = first + np.cumsum(dx, axis=1)
+        top = 0.5 * (2 * x - dx + np.sqrt(dx**2 - 2.0 * r**2 / steps * np.log1p(-draw(UNIFORM))))
+        return b - np.concatenate([first, top], axis=1)
+
+    return playing(path, steps), p
 
 
 PROCESSES = (brownian, ornstein_uhlenbeck, chain, gap)
