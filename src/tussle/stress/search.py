@@ -32,6 +32,8 @@ MAX_BEST = 32
 """Games that came nearest, of which branches are made."""
 APART = 0.2
 """Failures differ if one value, or the time of failure, differs by more than this part of its range."""
+MAX_ASKED = 40
+"""Failing games that are played again to see who failed, or a few more."""
 START = stream_key("stress", "search")
 
 Values = Mapping[str, Value]
@@ -233,6 +235,7 @@ def search(
     first_seed: int,
     length: int,
     is_differential: bool,
+    blame: Callable[[Played], Any],
 ) -> FailureSearch:
     """Search until a number of games has been played.
 
@@ -246,6 +249,7 @@ def search(
         first_seed: Seed of the first game.
         length: Of the longest game, in steps.
         is_differential: Each game is played of two missions.
+        blame: Returns what and who failed in a game.
 
     Raises:
         ParameterError: The mission cannot be played with any values of the first rounds.
@@ -293,7 +297,7 @@ def search(
             )
         by.learn(robustness)
     failed = sorted((g for g in result.games if g.has_failed), key=lambda g: g.robustness)
-    result.failures = different(failed, variables, length)
+    result.failures = different(failed, variables, length, blame)
     return result
 
 
@@ -307,26 +311,35 @@ def _parents(games: Sequence[Tried], n: int, seed: int) -> list[tuple[Tried, int
     return [near[int(draw * len(near))] for draw in draws.tolist()] if near else []
 
 
-def different(failed: Sequence[Tried], variables: Sequence[Variable], length: int) -> list[Tried]:
-    """Those games that differ from all before in a choice, or by more than `APART` in a value or in the time of failure.
+def different(
+    failed: Sequence[Tried],
+    variables: Sequence[Variable],
+    length: int,
+    blame: Callable[[Played], Any] = lambda _: None,
+) -> list[Tried]:
+    """Those games that differ from all before: in a choice, by more than `APART` in a value or the time of failure, or in what fails.
 
     Args:
         failed: Games that failed.
         variables: What varied.
         length: Of the longest game, in steps.
+        blame: Returns what and who failed in a game; it is asked where nothing else differs, of `MAX_ASKED` games at most.
     """
-    kept: list[Tried] = []
-    places: list[tuple[tuple[Value, ...], np.ndarray]] = []
+    kept: list[tuple[Tried, tuple[Value, ...], np.ndarray]] = []
+    known: dict[int, Any] = {}
     for game in failed:
         choices = tuple(game.values[v.name] for v in variables if isinstance(v, Choice))
         place = np.array(
             [_place(v, game.values[v.name]) for v in variables if isinstance(v, Range)]
             + [(game.played.verdict.first_below(0.0) or 0) / max(length, 1)]
         )
-        if all(choices != c or np.abs(place - p).max() > APART for c, p in places):
-            kept.append(game)
-            places.append((choices, place))
-    return kept
+        alike = [g for g, c, p in kept if choices == c and np.abs(place - p).max() <= APART]
+        for each in [game, *alike] if alike and len(known) < MAX_ASKED else ():
+            if each.number not in known:
+                known[each.number] = blame(each.played)
+        if not alike or (game.number in known and all(known[g.number] != known[game.number] for g in alike)):
+            kept.append((game, choices, place))
+    return [game for game, _, _ in kept]
 
 
 def _value(variable: Variable, share: float) -> Value:

@@ -35,6 +35,8 @@ CHOICE, MOVED = stream_key("stress", "survivor"), stream_key("stress", "moved")
 MIN_PROBABILITY = 1e-15
 """Below it a repetition ends as if no game had come nearer: where branches do not differ, levels creep on without end."""
 
+BEFORE = 2**16 - 1
+"""Number of the repetition that finds the levels of moves."""
 MAX_MOVED = 8
 """Entities that one move lets start elsewhere."""
 PASSING = 0.1

@@ -28,6 +28,7 @@ from tussle.errors import BatchError, ParameterError, TussleError
 from tussle.mission import Mission, to_xml
 from tussle.mission.effects import exactly
 from tussle.record.run_file import versions
+from tussle.stress.blame import blame
 from tussle.stress.chances import Chance, chances
 from tussle.stress.changes import changed
 from tussle.stress.distributions import Distribution, with_distributions
@@ -39,7 +40,7 @@ from tussle.stress.results import record_game, write_result, write_why
 from tussle.stress.search import FailureSearch, label, search, searcher
 from tussle.stress.shrink import MAX_SHRINK_GAMES, SmallestGame, shrink
 from tussle.stress.specification import Function, Specification, columns_of
-from tussle.stress.splitting import NO_REDRAWS, Redraws, Repetition, interval, split
+from tussle.stress.splitting import BEFORE, NO_REDRAWS, Redraws, Repetition, interval, split
 from tussle.stress.why import Explanation, Why
 
 MANY = 0.5
@@ -51,6 +52,10 @@ MAX_MADE = 4096
 
 class Stress:
     """A mission and a specification that its games must keep.
+
+    Methods that play games take `directory`, where they are kept and from where the same study goes on, or None for memory only, and
+    `executor`, `processes`, `stack` and `on_game` as of `GamePlayer`. They raise BatchError if a game fails with an error, or if the
+    directory holds another study.
 
     Args:
         mission: A mission file, the name of one that ships, or a `Mission`.
@@ -178,11 +183,6 @@ class Stress:
 
         Args:
             games: How many.
-            directory: Where games are kept, and from where the same study goes on; None keeps them in memory.
-            how: `executor`, `processes`, `stack` and `on_game`, as for `GamePlayer`.
-
-        Raises:
-            BatchError: A game has failed with an error, or the directory holds another study.
         """
         check_argument("games", games, Whole(1, 10**9))
         self._check_plain("sample")
@@ -217,11 +217,9 @@ class Stress:
             per_round: Games that are proposed and played together.
             sample_seed: Seed of what is proposed.
             failures: End after the round in which so many games have failed; None for never.
-            directory: Where games are kept, and from where the same study goes on; None keeps them in memory.
-            how: `executor`, `processes`, `stack` and `on_game`, as for `GamePlayer`.
 
         Raises:
-            BatchError: A game has failed with an error, the directory holds another study, or the mission file has changed meanwhile.
+            BatchError: The mission file has changed meanwhile.
             MissingExtraError: Optuna or cmaes is not installed.
             ParameterError: Nothing varies, no values can be played, or an argument is not allowed.
         """
@@ -254,6 +252,7 @@ class Stress:
             found = search(
                 play, self._refusal, self.variables, by, games, math.inf if failures is None else failures,
                 self.first_seed, self.mission.steps, bool(self.others),
+                lambda failed: blame(self.mission_of(failed.game), failed, self.specification),
             )  # fmt: skip
             tried = {"games": len(found.games), "failed": found.n_failed, "refused": len(found.refused)}
             self._write(ledger, [game.played for game in found.failures], tried)
@@ -307,11 +306,8 @@ class Stress:
             repetitions: Independent repetitions, from which the interval follows.
             replaced: Part of the games that a round replaces.
             redraws: How often, at some levels, each game is tried with another start of one entity, see `tussle.stress.splitting`.
-            directory: Where games are kept, and from where the same study goes on; None keeps them in memory.
-            how: `executor`, `processes`, `stack` and `on_game`, as for `GamePlayer`.
 
         Raises:
-            BatchError: A game has failed with an error, or the directory holds another study.
             ParameterError: The mission has no randomness, or a number is not allowed.
         """
         self._check_plain("probability")
@@ -327,7 +323,8 @@ class Stress:
             play, before, moves = _Random(player.play), list[Repetition](), NO_REDRAWS
             if redraws:
                 starts = [(b.name, i + 1) for b in self.mission.blocks if not b.rate for i in range(b.count)]
-                before = split(play, particles, n_replaced, [repetitions], self.first_seed)
+                few = max(2, particles // 2)
+                before = split(play, few, max(1, round(replaced * few)), [BEFORE], self.first_seed)
                 moves = Redraws.of(before[0], starts, redraws)
             found = split(play, particles, n_replaced, range(repetitions), self.first_seed, moves)
             value, low, high = interval([r.probability for r in found])
@@ -356,11 +353,8 @@ class Stress:
         Args:
             games: Of the last sample, from which the estimate follows.
             per_round: Games of each round before, which seek where failures are.
-            directory: Where games are kept, and from where the same study goes on; None keeps them in memory.
-            how: `executor`, `processes`, `stack` and `on_game`, as for `GamePlayer`.
 
         Raises:
-            BatchError: A game has failed with an error, or the directory holds another study.
             ParameterError: A value has no distribution, the mission cannot be played with a value, all games fail or none, or a number is
                 not allowed.
         """
@@ -437,11 +431,8 @@ class Stress:
             failed: A game of this study that failed.
             moments: Moments, evenly spread from the start of the game to its failure.
             branches: Branches from each.
-            directory: Where games are kept; None keeps them in memory.
-            how: `executor`, `processes`, `stack` and `on_game`, as for `GamePlayer`.
 
         Raises:
-            BatchError: A game has failed with an error, or the directory holds another study.
             ParameterError: The game did not fail, or a number is not allowed.
         """
         check_argument("moments", moments, Whole(2, 10**4))
@@ -466,10 +457,8 @@ class Stress:
             branches: Games of each row, and from each moment.
             directory: Where games are kept, and the result is added to that of `sample`, `probability` or `search`, with the nearest
                 passing game as `failures/N-saved.xml` and recordings of both; None keeps them in memory.
-            how: `executor`, `processes`, `stack` and `on_game`, as for `GamePlayer`.
 
         Raises:
-            BatchError: A game has failed with an error, or the directory holds another study.
             ParameterError: The game did not fail, or a number is not allowed.
         """
         check_argument("moments", moments, Whole(2, 10**4))

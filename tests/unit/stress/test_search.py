@@ -6,7 +6,9 @@ import json
 import runpy
 from pathlib import Path
 
+import numpy as np
 import pytest
+from test_shrink import crowds
 
 from tussle import Block, Mission, Simulation
 from tussle.api import Autonomy, Output, Param
@@ -15,6 +17,7 @@ from tussle.errors import BatchError, MissionError, ParameterError
 from tussle.mission import read_mission
 from tussle.stock import SingleIntegrator
 from tussle.stress import Monitor, Specification, Stress
+from tussle.stress.blame import blame
 from tussle.stress.search import different
 
 ROOT = Path(__file__).parents[3]
@@ -60,6 +63,37 @@ def test_the_worst_failures_come_first_and_differ(found):
     assert different(result.failures, study.variables, study.mission.steps) == result.failures
     assert len(result.failures) < result.n_failed
     assert len(result.failures) > 1
+
+
+def test_failures_of_others_at_the_same_time_are_different():
+    """By the pair that is too near at the moment of failure, as all distances of that moment say."""
+    study = Stress(
+        crowds(), "always (distance(north, south) > 0.3 m)", vary={"north.Cruise.speed": (0.99, 1.01)}
+    )
+    result = study.search(24, "random", processes=1)
+    who = [blame(study.mission_of(g.played.game), g.played, study.specification) for g in result.failures]
+    assert len(result.failures) > 5 > len(different(result.failures, study.variables, study.mission.steps))
+    assert len(set(who)) == len(who)
+    for game, (text,) in zip(result.failures[:3], who, strict=False):
+        sim = Simulation(study.mission_of(game.played.game), game.played.game.seed)
+        sim.step(game.played.verdict.first_below(0.0))
+        north, south = (sim.read(f"{name}.pos")[0][0] for name in ("north", "south"))
+        apart = np.linalg.norm(north[:, None] - south[None], axis=2)
+        i, j = np.unravel_index(apart.argmin(), apart.shape)
+        assert text == f"distance(north, south) of north/{i + 1}, south/{j + 1}"
+
+
+def test_what_and_who_fails_is_known_of_all_signals():
+    """Of parts of a specification, of the slowest, and of counts, for which nobody in particular is to blame."""
+    study = Stress(
+        crowds(), "always (max_speed(north) < 0.5) and always (count(all) > 99) and always (time > 5)"
+    )
+    (game,) = study.sample(1, processes=1).games
+    assert blame(study.mission, game, study.specification) == ("max_speed(north)", "count(all)", "time()")
+    fast = study.mission.replace(blocks=[study.mission.blocks[0], study.mission.blocks[1].replace(count=1)])
+    own = Stress(fast, "always (max_speed(south) < 0.5)")
+    (game,) = own.sample(1, processes=1).games
+    assert blame(fast, game, own.specification) == ("max_speed(south) of south/1",)
 
 
 def test_a_failure_is_a_mission_that_fails_when_it_is_played(found):
