@@ -214,7 +214,7 @@ class UntilHolds(Formula):
 
         def later(by: int) -> np.ndarray:  # what is found from a later sample on, if `left` holds until then
             held = windowed(left, 0, by - 1, np.minimum, np.inf)
-            return np.minimum(held, np.concatenate([found[by:], np.full(min(by, n), -np.inf)]))
+            return np.asarray(np.minimum(held, np.concatenate([found[by:], np.full(min(by, n), -np.inf)])))
 
         found = right  # of a window from the sample on, so many samples wide
         while width <= last - self.first:

@@ -72,8 +72,7 @@ def test_failures_of_others_at_the_same_time_are_different():
     )
     result = study.search(24, "random", processes=1)
     who = [blame(study.mission_of(g.played.game), g.played, study.specification) for g in result.failures]
-    assert len(result.failures) > 5 > len(different(result.failures, study.variables, study.mission.steps))
-    assert len(set(who)) == len(who)
+    assert len(set(who)) > len(different(result.failures, study.variables, study.mission.steps)) > 1
     for game, (text,) in zip(result.failures[:3], who, strict=False):
         sim = Simulation(study.mission_of(game.played.game), game.played.game.seed)
         sim.step(game.played.verdict.first_below(0.0))
@@ -85,11 +84,9 @@ def test_failures_of_others_at_the_same_time_are_different():
 
 def test_what_and_who_fails_is_known_of_all_signals():
     """Of parts of a specification, of the slowest, and of counts, for which nobody in particular is to blame."""
-    study = Stress(
-        crowds(), "always (max_speed(north) < 0.5) and always (count(all) > 99) and always (time > 5)"
-    )
+    study = Stress(crowds(), "always (max_speed(north) < 0.5) and always (count(all) > 99 and time > 5)")
     (game,) = study.sample(1, processes=1).games
-    assert blame(study.mission, game, study.specification) == ("max_speed(north)", "count(all)", "time()")
+    assert blame(study.mission, game, study.specification) == ("count(all)", "time()")
     fast = study.mission.replace(blocks=[study.mission.blocks[0], study.mission.blocks[1].replace(count=1)])
     own = Stress(fast, "always (max_speed(south) < 0.5)")
     (game,) = own.sample(1, processes=1).games
