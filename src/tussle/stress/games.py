@@ -76,8 +76,8 @@ class StressGame:
         return self._with(0, key, [r for r in self.rekeys if r[2:] != (target,)], target)
 
     def _with(self, step: int, key: int, kept: Sequence[Rekey], *target: str) -> StressGame:
-        rekeys = sorted([*kept, (step, key, *target)], key=lambda r: (r[0], *r[2:]))
-        return replace(self, rekeys=tuple(rekeys))
+        added: Any = (step, key, *target)
+        return replace(self, rekeys=tuple(sorted([*kept, added], key=lambda r: (r[0], *r[2:]))))
 
     def redrawn(self, step: int, key: int, target: str) -> StressGame:
         """The same game, in which the draws of a target alone have another key from a step on."""
