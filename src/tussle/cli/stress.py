@@ -80,32 +80,24 @@ def stress(options: StressOptions) -> int:
             meter.show(n, None if options.probability else options.games * (1 + len(study.others)))
 
         how: dict[str, Any] = {"processes": options.processes, "stack": options.stack, "on_game": on_game}
+        how["directory"] = directory
         try:
             if options.is_search:
                 searched = study.search(
-                    options.games,
-                    options.sampler,
-                    sample_seed=options.sample_seed,
-                    directory=directory,
-                    **how,
+                    options.games, options.sampler, sample_seed=options.sample_seed, **how
                 )
                 failures = [game.played for game in searched.failures]
             elif options.importance:
-                weighted = study.importance(options.games, directory=directory, **how)
+                weighted = study.importance(options.games, **how)
                 failures = weighted.failures
             elif options.probability:
-                found = study.probability(
-                    options.particles,
-                    options.repetitions,
-                    redraws=options.redraws,
-                    directory=directory,
-                    **how,
-                )
+                numbers = options.particles, options.repetitions
+                found = study.probability(*numbers, redraws=options.redraws, **how)
                 failures = found.failures
             else:
-                sample = study.sample(options.games, directory=directory, **how)
+                sample = study.sample(options.games, **how)
                 failures = sample.failures
-            why = study.why(failures[0], directory=directory, **how) if options.why and failures else None
+            why = study.why(failures[0], **how) if options.why and failures else None
         except Interrupted:
             say(
                 "interrupted",
