@@ -39,11 +39,11 @@ def test_moves_to_other_starts_change_no_probability(levels):
 def test_intervals_cover_a_probability_that_the_start_decides(p):
     """90 to 99 of 100 studies."""
     play, exact = begun(p)
-    (before,) = split(play, 60, 15, [1000], 1)
+    (before,) = split(play, 100, 25, [2000], 1)
     moves = Redraws.of(before, ENTITIES, 3)
-    repetitions = split(play, 60, 15, range(1000), 1, moves)
+    repetitions = split(play, 100, 25, range(2000), 1, moves)
     estimates = [r.probability for r in repetitions]
-    covered = [interval(estimates[10 * k : 10 * k + 10]) for k in range(100)]
+    covered = [interval(estimates[20 * k : 20 * k + 20]) for k in range(100)]
     n = sum(low <= exact <= high for _, low, high in covered)
     print(
         f"begun {p:.2g}: {n} of 100 intervals cover; {np.mean([r.n_games for r in repetitions]):.0f} games in a repetition"
