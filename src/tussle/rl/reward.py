@@ -275,8 +275,9 @@ class Term:
             raise ParameterError(
                 f"Term: function = {self.function!r} is not allowed; it takes a function of a Situation"
             )
-        if not (isinstance(self.weight, (int, float, np.number)) and np.isfinite(self.weight)):
-            raise ParameterError(f"Term: weight = {self.weight!r} is not allowed; it takes a finite number")
+        weight: Any = self.weight
+        if not (isinstance(weight, (int, float, np.number)) and np.isfinite(weight)):
+            raise ParameterError(f"Term: weight = {weight!r} is not allowed; it takes a finite number")
 
     def write(self, now: Situation, out: np.ndarray) -> None:
         """Write the weighted values to out, (W, A); 0 for agents that were dead before.

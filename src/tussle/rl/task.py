@@ -123,7 +123,7 @@ class Task:
             if not isinstance(value, kind):
                 raise ParameterError(f"{where}: {name} = {value!r:.80} is not allowed; it takes {allowed}")
         check_argument(f"{where}: decide_every", self.decide_every, Whole(1))
-        limit = self.time_limit
+        limit: Any = self.time_limit
         if limit is not None and not (isinstance(limit, (int, float, np.number)) and limit > 0.0):
             raise ParameterError(
                 f"{where}: time_limit = {self.time_limit!r} is not allowed; it takes a number of seconds > 0"
