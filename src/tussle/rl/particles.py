@@ -274,11 +274,11 @@ class PushToOwn(EasyAutonomy):
     """Pushes the k-th particle of a block to the k-th landmark, whose ids follow: the rule of dispersion."""
 
     n = Param(4, gt=0, doc="Number of particles.")
-    push_x = Output()
-    push_y = Output()
+    push_x = Output(unit="N")
+    push_y = Output(unit="N")
 
     def step_one(self, me: Any) -> None:
-        offset = me.entity(me.id + self.n).pos - me.pos
+        offset = me.entity(me.id + me.n).pos - me.pos
         me.push_x, me.push_y = (min(max(10.0 * value, -1.0), 1.0) for value in offset[:2])
 
 
@@ -329,7 +329,10 @@ class Dispersion(Task):
     )  # fmt: skip
     time_limit = 10.0
     learners = "agent"
-    observation = (Own("pos vel", planar=True), Computed(12, food))
+    observation = (
+        Own("pos vel", planar=True),
+        Computed(12, food, [-2.0, -2.0, 0.0] * 4, [2.0, 2.0, 1.0] * 4),
+    )
     action = (Act("push_x", -1.0, 1.0), Act("push_y", -1.0, 1.0))
     reward = {"meals": Term(meals)}  # noqa: RUF012
 
