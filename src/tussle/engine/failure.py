@@ -56,6 +56,17 @@ def raised(error: BaseException, plugin: Any, *, where: str, step: int, world: i
     return PluginError(text, where=where, step=step, world=world, plugin=plugin.instance_name, cause=error)
 
 
+def leaving(end: SystemExit, step: int) -> BaseException:
+    """Return an interruption if `q` in the debugger ended the program, as it does from Python 3.14 on; the same exit otherwise."""
+    frames = traceback.extract_tb(end.__traceback__)
+    if Path(frames[-1].filename).stem != "pdb":
+        return end
+    place = next(f for f in reversed(frames) if Path(f.filename).stem not in ("pdb", "bdb", "cmd"))
+    return KeyboardInterrupt(
+        f"the debugger was left in {Path(place.filename).name}:{place.lineno}, step {step}"
+    )
+
+
 def in_call(error: Exception, plugin: Any, view: GroupView, group: Group | None = None) -> PluginError:
     """Return the `PluginError` for an exception in a plugin call: with plugin and step, and with entity and world if they are known.
 

@@ -20,7 +20,7 @@ from tussle.declare.columns import Handle
 from tussle.declare.displays import counted, line, listing, page, table
 from tussle.declare.messages import Message, Messages
 from tussle.documents import Maybe, Real, Whole, check_argument, is_whole
-from tussle.engine import access
+from tussle.engine import access, failure
 from tussle.engine.arrivals import reset, spawn_due
 from tussle.engine.calls import Schedule
 from tussle.engine.delivery import order
@@ -179,6 +179,8 @@ class Simulation:
                 function()
         except PluginError as error:
             self._stop(error)
+        except SystemExit as end:
+            raise failure.leaving(end, int(self.steps.max())) from None
 
     def _stop(self, error: PluginError) -> None:
         """End the stack after an exception: record or raise the error."""

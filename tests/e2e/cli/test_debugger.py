@@ -5,6 +5,7 @@ from __future__ import annotations
 import bdb
 import os
 import pty
+import re
 import subprocess
 
 import pytest
@@ -50,13 +51,13 @@ def left_in(folder, step, stdin, send):
 @pytest.mark.parametrize("step", [0, 12])
 def test_q_interrupts_the_game_and_what_was_played_can_be_read(folder, step):
     def send(process):
-        process.stdin.write("p me.speed\nq\n")
+        process.stdin.write("p me.speed\nq\ny\n")  # from Python 3.14 on, it asks
         process.stdin.flush()
 
     code, out, err = left_in(folder, step, subprocess.PIPE, send)
     assert code == 130, err
     assert "(Pdb) 1.0" in out
-    assert f"interrupted: the debugger was left in Stops, step {step}\n" in err
+    assert re.search(rf"interrupted: the debugger was left in (Stops|stops.py:\d+), step {step}\n", err)
     assert "note: the game up to there is in out\n" in err
     run = load_run(folder / "out")
     assert (run.is_complete, run.info["interrupted"]) == (False, "interrupted")
@@ -66,12 +67,14 @@ def test_q_interrupts_the_game_and_what_was_played_can_be_read(folder, step):
 def test_the_end_of_input_on_a_terminal_is_the_same(folder):
     main, other = pty.openpty()
     try:
-        code, _, err = left_in(folder, 3, other, lambda _: os.write(main, b"\x04"))
+        code, _, err = left_in(
+            folder, 3, other, lambda _: os.write(main, b"\x04\x04")
+        )  # the second answers a question, from Python 3.14 on
     finally:
         os.close(main)
         os.close(other)
     assert code == 130, err
-    assert "interrupted: the debugger was left in Stops, step 3\n" in err
+    assert re.search(r"interrupted: the debugger was left in (Stops|stops.py:\d+), step 3\n", err)
 
 
 def test_in_python_it_is_a_keyboard_interrupt():
