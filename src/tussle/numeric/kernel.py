@@ -45,12 +45,14 @@ class Stats:
     Attributes:
         compiled: Number of kernels compiled.
         loaded: Number of kernels loaded from disk.
+        ready: Number of kernels whose machine code has been made available, whether they still exist or not.
         interpreted: Number of calls of kernels that ran as Python.
         on_compile: Called with a kernel's name before it is compiled, e.g. to show progress.
     """
 
     compiled: int = 0
     loaded: int = 0
+    ready: int = 0
     interpreted: int = 0
     on_compile: Callable[[str], None] | None = None
 
@@ -342,6 +344,7 @@ class Kernel(Device):
             self._compiled = result
             self.call_by(main)
             ready.add(self)
+            stats.ready += 1
 
     @property
     def machine_code(self) -> Callable[..., Any]:

@@ -91,7 +91,7 @@ def recording(locked: Sequence[np.ndarray] = ()) -> Iterator[KernelCalls]:
         recorded.is_whole = False
         yield recorded
         return
-    before = len(ready), stats.interpreted
+    before = stats.ready, stats.interpreted
     try:
         Kernel.__call__ = first_call  # type: ignore[method-assign, assignment]
         for each in list(ready):
@@ -106,7 +106,7 @@ def recording(locked: Sequence[np.ndarray] = ()) -> Iterator[KernelCalls]:
         for each in list(ready):
             each.call_by(None)
         # New kernels, and those that ran as Python, have not been listened to.
-        recorded.is_whole &= before == (len(ready), stats.interpreted)
+        recorded.is_whole &= before == (stats.ready, stats.interpreted)
         _is_recording.release()
 
 

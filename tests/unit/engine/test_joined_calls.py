@@ -1,5 +1,7 @@
 """Plugins that only call kernels, joined into one call of machine code, give the bits that they give one by one."""
 
+import gc
+
 import numpy as np
 import pytest
 
@@ -11,7 +13,7 @@ from tussle.messages import CaptureEntity
 from tussle.mission import read_mission
 from tussle.numeric.kernel import kernel
 from tussle.numeric.neighbors.chain import kernel_of_chains
-from tussle.numeric.replay import Replay
+from tussle.numeric.replay import Replay, recording
 from tussle.stock import (
     Boids,
     NoisyContacts,
@@ -546,3 +548,20 @@ def test_the_list_of_calls_stays_what_it_is():
         simulation.step(40)
         assert simulation.describe() == before
         assert len(simulation.schedule.functions) == len(simulation.schedule) - 3
+
+
+def test_kernels_that_go_while_calls_are_recorded_change_nothing():
+    """As those of a simulation that nothing holds any longer."""
+
+    def clear(x):
+        x[0] = 0.0
+
+    kept, *gone = (kernel("Fw")(clear) for _ in range(4))
+    for each in (kept, *gone):
+        each(np.ones(1))
+    with recording() as recorded:
+        kept(np.ones(1))
+        del each, gone
+        gc.collect()
+    assert recorded.is_whole
+    assert len(recorded.calls) == 1
