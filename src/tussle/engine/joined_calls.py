@@ -105,7 +105,7 @@ class JoinedCalls:
         return failure.in_call(error, plugin, view, group)
 
     def _columns(self) -> list[np.ndarray]:
-        """The arrays that plugins of the calls may change, by kernels."""
+        """The arrays that plugins of the calls may change, by kernels; looked at until two steps have agreed, since that takes time."""
         groups = [g for g in self.state.population.groups if any(view in self.views for view in g.views)]
         moved = [getattr(g.motion_view, name) for g in groups for name in WRITABLE]
         return moved + [
@@ -117,7 +117,7 @@ class JoinedCalls:
         bodies.touch(0, bodies.n)
         ends, later, callers = [], [], []
         try:
-            with recording(self._columns()) as recorded:
+            with recording([] if self.is_known else self._columns()) as recorded:
                 for call in self.calls:
                     context.later = []
                     call.run()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from functools import cache
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
@@ -38,10 +38,12 @@ class KernelCalls:
 
     def listener(self, each: Kernel) -> Callable[..., Any]:
         """Return a function that calls a kernel and records the call."""
-        run = each.machine_code
+        run: Callable[..., Any] = each.machine_code
+        if self._spans:
+            run = partial(self.unlocked, run)
 
         def call(*arguments: Any, **named: Any) -> Any:
-            found = self.unlocked(run, *arguments, **named)
+            found = run(*arguments, **named)
             if threading.get_ident() == self._thread:
                 self.calls.append((each, *arguments))
                 self.is_whole &= (found is None or found is True) and not named
@@ -93,7 +95,8 @@ def recording(locked: Sequence[np.ndarray] = ()) -> Iterator[KernelCalls]:
         return
     before = stats.ready, stats.interpreted
     try:
-        Kernel.__call__ = first_call  # type: ignore[method-assign, assignment]
+        if locked:
+            Kernel.__call__ = first_call  # type: ignore[method-assign, assignment]
         for each in list(ready):
             each.call_by(recorded.listener(each))
         for array in locked:
@@ -102,7 +105,8 @@ def recording(locked: Sequence[np.ndarray] = ()) -> Iterator[KernelCalls]:
     finally:
         for array in locked:
             array.flags.writeable = True
-        Kernel.__call__ = slow_call  # type: ignore[method-assign]
+        if locked:
+            Kernel.__call__ = slow_call  # type: ignore[method-assign]
         for each in list(ready):
             each.call_by(None)
         # New kernels, and those that ran as Python, have not been listened to.
