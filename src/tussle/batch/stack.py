@@ -264,15 +264,12 @@ def metrics_of(result: WorldResult) -> list[tuple[int | None, str, float]]:
     for plugin, named in result.metrics.items():
         for name, found in named.items():
             by_team = found if isinstance(found, dict) else {None: found}
-            metric, why = f"{plugin}.{name}", ""
-            if not all(isinstance(value, (bool, int, float)) for value in by_team.values()):
-                why = f"reports {name!r} as {found!r}, which is no number, so the batch does not keep it"
-            elif (length := len(column_name(metric, None))) > MAX_NAME:
-                why = f"reports {name[:40]!r}..., whose name has {length} characters, so the batch does not keep it; at most {MAX_NAME}"
+            metric = f"{plugin}.{name}"
+            if (length := len(column_name(metric, None))) > MAX_NAME:
+                why = f"whose name has {length} characters, so the batch does not keep it; at most {MAX_NAME}"
+                warnings.warn(f"{plugin} reports {name[:40]!r}..., {why}", RuntimeWarning, stacklevel=2)
             else:
                 out += [(team, metric, bounded(value)) for team, value in by_team.items()]
-            if why:
-                warnings.warn(f"{plugin} {why}", RuntimeWarning, stacklevel=2)
     return out or [
         (None, "alive", 0.0)
     ]  # the tables have one row per metric, so a run without any would be missing

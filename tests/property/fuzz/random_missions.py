@@ -32,7 +32,7 @@ from tussle.plugins import stock
 KINDS = (Behavior, Autonomy, Controller, MotionModel, Sensor, Interaction, Metric, Network)
 ON_FILES = ("GraphInteraction", "MapGen2D", "TrajectoryRecordPlayback")
 """Plugins that read a file, which random missions do not have."""
-UNFIT = ("TerrainGenerator", *(name for name in stock.manifest() if "JSBSim" in name))
+UNFIT = ("Absence", "TerrainGenerator", *(name for name in stock.manifest() if "JSBSim" in name))
 """Plugins that random companions and parameters hardly ever suit: two equal resolutions, an aircraft's files."""
 RATES = (1.0, 2.5, 3.0, 4.0, 9.0)
 
@@ -105,6 +105,13 @@ def made(chance: random.Random, kind: type[Plugin], teams: list[int], blocks: li
     values = {
         name: value(chance, param, teams) for name, param in kind.params().items() if chance.random() < 0.3
     }
+    for low in kind.params():
+        high = low.replace("min", "max")
+        ends = [
+            values.get(name, kind.params()[name].default) for name in (low, high) if name in kind.params()
+        ]
+        if high != low and len(ends) == 2 and ends[0] > ends[1]:
+            values[low], values[high] = reversed(ends)
     for name in kind.params():
         if name in ("template", "block"):
             values[name] = chance.choice(blocks)

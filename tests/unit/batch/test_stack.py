@@ -173,9 +173,9 @@ def test_a_game_that_is_over_at_once_is_kept():
     assert finished(nobody, n=2)[1][0] == "all_dead"
 
 
-def test_what_is_no_number_is_said_and_left_out():
-    with pytest.warns(RuntimeWarning, match="Trouble reports 'word' as 'said', which is no number"):
-        run = finished(game(how="word"), n=1)[0]
+def test_a_result_that_is_no_number_is_the_error_of_its_run():
+    run = finished(game(how="word"), n=1)[0]
+    assert "Trouble.result: 'word' = np.str_('said') is not allowed; it takes numbers" in run[5]
     assert run[6] == finished(game(), n=1)[0][6]
 
 
