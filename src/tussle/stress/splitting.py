@@ -8,9 +8,9 @@ A repetition plays n games. In each round, those that stayed farthest from failu
 a random survivor up to the first step at which it was nearer to failure than the level of the round, and then has other luck. A branch is
 a game of its own, with a seed and re-keys; its states up to the branch are computed again, bit for bit.
 
-Where starts decide, games are moved too (`Redraws`): at levels that are fixed before, each game is proposed with other numbers for the
-start of one entity, and stays as it was if it would not come as near as the level. That leaves the law of the games beyond the level as
-it is, since the numbers are independent of each other and one is drawn again whatever it was (a Metropolis step; Cérou et al. 2012,
+Where starts decide, games are moved too (`Redraws`): at levels that are fixed before, each game is tried with other numbers for the start
+of one or a few entities, and stays as it was if it would not come as near as the level. That leaves the law of the games beyond the level
+as it is, since the numbers are independent of each other and one is drawn again whatever it was (a Metropolis step; Cérou et al. 2012,
 "Sequential Monte Carlo for rare event estimation", section 3). Afterwards each game has other luck from the first step beyond the level
 on, as what came later has been looked at. At a fixed level, the mean of the estimate of each function of the games is exact (Bréhier et
 al. 2016, theorem 3.2), so it stays exact with the moves. Levels that depended on the games that are moved would have a bias.
@@ -100,7 +100,7 @@ class Redraws:
 
     @classmethod
     def of(cls, pilot: Repetition, starts: Sequence[tuple[str, int]], n: int) -> Redraws:
-        """Moves at levels that by a repetition without moves a part of `PASSING` of the games passes from one to the next."""
+        """Return moves at levels that are taken from a repetition without moves: of its games, `PASSING` came from each to the next."""
         levels, passing = list[float](), PASSING
         reached = np.cumprod(1.0 - np.array(pilot.shares))
         for level, part in zip(pilot.levels, reached.tolist(), strict=True):

@@ -305,7 +305,7 @@ class Stress:
             particles: Games at a time, of each repetition.
             repetitions: Independent repetitions, from which the interval follows.
             replaced: Part of the games that a round replaces.
-            redraws: How often, at some levels, each game is tried with another start of one entity, see `tussle.stress.splitting`.
+            redraws: How often, at some levels, each game is tried with another start of a few entities, see `tussle.stress.splitting`.
 
         Raises:
             ParameterError: The mission has no randomness, or a number is not allowed.

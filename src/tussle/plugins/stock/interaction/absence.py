@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from tussle.api import Interaction, Param, WorldView
+from tussle.errors import ParameterError
 
 
 class Absence(Interaction):
@@ -18,6 +19,14 @@ class Absence(Interaction):
 
     block = Param("", doc="Name of the block; empty for none.")
     numbers = Param((), ragged=True, doc="Numbers of the entities in their block, from 1; empty for all.")
+
+    def check_values(self) -> None:
+        """Check that numbers of entities are whole and count from 1."""
+        for number in self.values["numbers"]:
+            if number < 1 or number % 1:
+                raise ParameterError(
+                    f"Absence.numbers: {number:g} is not allowed; it takes whole numbers from 1"
+                )
 
     def named_blocks(self) -> tuple[str, ...]:
         """Return the block."""
