@@ -127,6 +127,7 @@ NEEDS = {
     "node": Need("Node.js", _has_program("node"), "nodejs npm"),
     "ompl": package("OMPL", "ompl", 14),
     "opendis": Need("opendis", _has_module("opendis"), command="pip install --no-deps opendis"),
+    "rerun": Need("Rerun", _has_module("rerun"), command="pip install '.[rerun]'"),
     "renderer": Need("OSMesa or EGL", _has_renderer, "libosmesa6"),
     "rosbag": Need("rosbag", _has_program("rosbag"), "python3-rosbag"),
     "roscore": Need("ROS 1", _has_program("roscore"), ROSPY),

@@ -31,13 +31,14 @@ NUMPY_FOR_KERNELS = {
     *("sqrt", "floor", "abs", "minimum", "maximum", "isnan", "isfinite"),
 }
 OF_ROS = {"rospy", "geometry_msgs", "nav_msgs", "sensor_msgs"}  # packages of Debian, which `.ci/run` installs
-OF_SITE = {"griffe", "mkdocs"}  # of the extra `docs`, which `.ci/run` installs
+OF_CI = {"griffe", "mkdocs", "rerun"}  # of the extras `docs` and `rerun`, which `.ci/run` installs
 OTHERS = {"opendis", "torchrl", "actors_pb2", "actors_pb2_grpc", "command_pb2", "command_pb2_grpc"}
 """Installed by `.ci/run` without its dependencies; tried where it is there; modules that protoc makes in tests."""
 IMPORTED_AS = {
     "foxglove_sdk": "foxglove",
     "pillow": "pil",
     "protobuf": "google",
+    "rerun_sdk": "rerun",
     "grpcio": "grpc",
     "grpcio_tools": "grpc_tools",
 }
@@ -157,7 +158,7 @@ def test_packages_of_extras_are_imported_where_they_are_used():
 def test_what_tests_and_examples_import_is_in_the_test_extra(tree):
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     used, declared = third_party(tree), requirements(project, "test")
-    allowed = declared | OF_ROS | OF_SITE | OTHERS | {"_pytest"}
+    allowed = declared | OF_ROS | OF_CI | OTHERS | {"_pytest"}
     missing = {name: place for name, place in used.items() if name.lower() not in allowed}
     assert not missing
 

@@ -55,6 +55,7 @@ def export(options: ExportOptions) -> int:
         ("html",): exporter.write_html,
         GEOGRAPHIC: exporter.write_geographic,
         ("mcap",): exporter.write_mcap,
+        ("rerun",): exporter.write_rerun,
         ("rosbag2",): exporter.write_rosbag2,
         ("png", "mp4", "gif"): exporter.write_films,
     }
@@ -207,6 +208,20 @@ class _Exporter:
         for note in report.notes:
             say_note(note)
         _report(report.path, f"{report.n_frames:,} states, {sum(report.n_messages.values()):,} messages")
+
+    def write_rerun(self, files: Mapping[str, Path]) -> None:
+        from tussle.view.export.rerun_file import write_rerun
+
+        recording = self.recording
+        with ProgressMeter("rerun", "states") as meter:
+            report = write_rerun(
+                recording,
+                files["rerun"],
+                period=self._options.period,
+                scale=self._film.scale,
+                show=meter.show,
+            )
+        _report(report.path, f"{report.n_frames:,} states of {report.n_entities:,} entities")
 
     def write_rosbag2(self, files: Mapping[str, Path]) -> None:
         from tussle.view.export.rosbag2 import write_rosbag2

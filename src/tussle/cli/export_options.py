@@ -26,6 +26,7 @@ DEFAULT_NAMES = {
     "gif": "film.gif",
     "png": "picture.png",
     "mcap": "run.mcap",
+    "rerun": "run.rrd",
     "rosbag2": "rosbag2",
     "geojson": "tracks.geojson",
     "kml": "tracks.kml",
@@ -39,13 +40,14 @@ DEFAULT_FILE = "@"
 FILMS = ("mp4", "gif")
 IMAGES = (*FILMS, "png")
 GEOGRAPHIC = ("geojson", "kml", "czml")
+VIEWERS = ("mcap", "rerun")
 USED_BY = {
     **dict.fromkeys(("camera", "follow", "start", "stop", "size", "trails", "labels", "no_caption", "zoom"), IMAGES),
     **dict.fromkeys(("speed", "fps"), FILMS),
     "at": ("png",),
-    "scale": (*IMAGES, "mcap"),
-    **dict.fromkeys(("map_file", "map_bounds"), (*IMAGES, "html", "mcap")),
-    "period": ("html", "mcap", "rosbag2", *GEOGRAPHIC),
+    "scale": (*IMAGES, *VIEWERS),
+    **dict.fromkeys(("map_file", "map_bounds"), (*IMAGES, "html", *VIEWERS)),
+    "period": ("html", *VIEWERS, "rosbag2", *GEOGRAPHIC),
     **dict.fromkeys(("other", "over", "spec", "margin", "mark"), ("html",)),
     "epoch": ("kml", "czml"),
     "storage": ("rosbag2",),
@@ -84,6 +86,7 @@ class ExportOptions(MapOptions, PluginOptions, RecordedAlarmOptions):
     gif: Annotated[Path | None, _output("gif", "A small animation.")] = None
     png: Annotated[Path | None, _output("png", "One image.")] = None
     mcap: Annotated[Path | None, _output("mcap", "A log for Foxglove.")] = None
+    rerun: Annotated[Path | None, _output("rerun", "A recording for Rerun.")] = None
     rosbag2: Annotated[Path | None, _output("rosbag2", "A folder for ros2 bag.")] = None
     geojson: Annotated[Path | None, _output("geojson", "Tracks and areas by latitude and longitude.")] = None
     kml: Annotated[Path | None, _output("kml", "The same with times, for Google Earth.")] = None

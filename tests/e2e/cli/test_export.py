@@ -115,13 +115,16 @@ def test_a_run_that_was_killed_is_exported_as_far_as_it_goes(tussle, played, fol
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ((), "--html, --mp4, --gif, --png, --mcap, --rosbag2, --geojson, --kml, --czml, --csv, --parquet"),
+        (
+            (),
+            "--html, --mp4, --gif, --png, --mcap, --rerun, --rosbag2, --geojson, --kml, --czml, --csv, --parquet",
+        ),
         (("--csv", "--camera", "top"), "--camera is allowed with --mp4 or --gif or --png only"),
         (("--png", "--fps", "30"), "--fps is allowed with --mp4 or --gif only"),
         (("--mp4", "--at", "1"), "--at is allowed with --png only"),
         (
             ("--png", "--period", "1"),
-            "--period is allowed with --html or --mcap or --rosbag2 or --geojson or --kml or --czml only",
+            "--period is allowed with --html or --mcap or --rerun or --rosbag2 or --geojson or --kml or --czml only",
         ),
         (("--png", "--camera", "folow"), "did you mean 'follow'?"),
         (("--png", "--camera", "top", "--follow", "3"), "follow = 3 means nothing to camera = 'top'"),
