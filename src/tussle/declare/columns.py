@@ -138,11 +138,10 @@ class Numbers(Column):
             return bool(float(value).is_integer() and -(2**63) <= value < 2**63)
         return self.dtype is float or bool(value in (0, 1))
 
-    def _set_recorded(self, recorded: bool, per: str = "entity") -> None:
-        if recorded and (self.ragged or per != "entity"):
-            what = "a ragged column" if self.ragged else f"a column per {per}"
+    def _set_recorded(self, recorded: bool) -> None:
+        if recorded and self.ragged:
             raise DeclarationError(
-                f"{type(self).__name__}: {what} is not recorded; recorded=True needs one value per entity"
+                f"{type(self).__name__}: a ragged column is not recorded; recorded=True needs one value per entity"
             )
         self.recorded = recorded
 
@@ -378,7 +377,7 @@ class State(Numbers):
         recorded: bool = False,
     ) -> None:
         super().__init__(fields, unit, dtype, doc, ragged)
-        self._set_recorded(recorded, per)
+        self._set_recorded(recorded)
         if per not in PER:
             raise DeclarationError(f"State: per={per!r} is not one of {', '.join(PER)}")
         if per == "team" and fields:

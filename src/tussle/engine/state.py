@@ -32,15 +32,17 @@ if TYPE_CHECKING:
 
 @dataclass
 class Parked:
-    """The last rows of a world that has ended: its parts of the body table and of each group's table.
+    """The last rows of a world that has ended: its parts of the body table, of each group's table and of the world plugins' tables.
 
     Attributes:
         bodies: Rows of the body table.
         tables: Key of a group -> (rows in `bodies`, the rows of the group's table).
+        of_world: Name of a world plugin -> its values per entity, in the order of `bodies`, and of this world.
     """
 
     bodies: Bodies
     tables: dict[Any, tuple[np.ndarray, Stored]]
+    of_world: dict[str, dict[str, Stored]]
 
 
 def _births(mission: Mission, arguments: tuple[Overrides, Context, float]) -> Births:

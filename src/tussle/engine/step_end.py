@@ -144,7 +144,9 @@ def _park(state: SimulationState, world: int) -> Parked:
         mine = np.flatnonzero((rows >= group.first) & (rows < group.last))
         if len(mine):
             tables[group.key] = mine, group.table.take(rows[mine] - group.first)
-    return Parked(Bodies(bodies.floats[:, rows].copy(), bodies.ints[:, rows].copy(), bodies.n_worlds), tables)
+    of_world = {b.spec.instance_name: b.take(rows, world) for b in state.world_bindings}
+    own = Bodies(bodies.floats[:, rows].copy(), bodies.ints[:, rows].copy(), bodies.n_worlds)
+    return Parked(own, tables, of_world)
 
 
 def world_result(state: SimulationState, world: int, reason: str, is_hashed: bool = True) -> WorldResult:

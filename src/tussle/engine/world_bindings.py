@@ -140,6 +140,11 @@ class WorldBinding:
             is_param = isinstance(declared.get(name), Param)
             self.plugin.__dict__[name] = read_only(array) if is_param else array
 
+    def take(self, rows: np.ndarray, world: int) -> dict[str, Stored]:
+        """Copy the values of rows of the body table and of a world."""
+        chosen = {"world": np.array([world]), "entity": rows}
+        return {per: table.take(chosen[per]) for per, table in self.tables.items() if table.places}
+
     def copy(self) -> dict[str, Stored]:
         return {per: table.copy() for per, table in self.tables.items()}
 

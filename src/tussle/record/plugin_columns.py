@@ -86,7 +86,7 @@ class Source:
         column: The column.
         path: Plugin names, outermost first.
         attribute: Name of the column in the plugin.
-        blocks: Names of the blocks whose entities it is recorded of.
+        blocks: Names of the blocks whose entities it is recorded of; none for a column of a world plugin, which all entities have.
     """
 
     column: PluginColumn
@@ -100,7 +100,8 @@ def select(mission: Mission, selectors: str) -> list[Source]:
 
     Args:
         mission: The mission.
-        selectors: Columns as "prey.Boids.goal", or "Boids.goal" for all blocks, separated by commas; `*` stands for any characters.
+        selectors: Columns as "prey.Boids.goal", or "Boids.goal" for all blocks, or "SimpleCapture.count" of a world plugin, separated
+            by commas; `*` stands for any characters.
 
     Raises:
         ParameterError: A selector matches no column, or only lists.
@@ -108,24 +109,28 @@ def select(mission: Mission, selectors: str) -> list[Source]:
     wanted = [text.strip() for text in selectors.split(",") if text.strip()]
     known: dict[str, Numbers] = {}
     found: dict[tuple[Any, ...], Source] = {}
+    owners: list[tuple[str, tuple[str, ...], Any]] = [
+        ("", (p.instance_name,), p) for p in mission.world_plugins
+    ]
     for block in mission.blocks:
-        for path, plugin in _plugins(block):
-            for name, column in type(plugin).columns.items():
-                if not isinstance(column, (State, EntityRef, Output)):
-                    continue
-                key = path, name, column.dtype, *_components(plugin, column)
-                short = ".".join((*path, name))
-                names = f"{block.name}.{short}", short
-                known |= dict.fromkeys(names, column)
-                is_wanted = column.recorded or any(_is_match(text, *names) for text in wanted)
-                if is_wanted and not column.ragged:
-                    made = Source(PluginColumn(short, *key[2:], column.doc), path, name)
-                    found.setdefault(key, made).blocks.add(block.name)
+        owners += [(block.name, path, plugin) for path, plugin in _plugins(block)]
+    for block_name, path, plugin in owners:
+        for name, column in type(plugin).columns.items():
+            if not isinstance(column, (State, EntityRef, Output)):
+                continue
+            key = bool(block_name), path, name, column.dtype, *_components(plugin, column)
+            short = ".".join((*path, name))
+            names = (f"{block_name}.{short}", short) if block_name else (short,)
+            known |= dict.fromkeys(names, column)
+            is_wanted = column.recorded or any(_is_match(text, *names) for text in wanted)
+            if is_wanted and not column.ragged:
+                made = Source(PluginColumn(short, *key[3:], column.doc), path, name)
+                found.setdefault(key, made).blocks.update([block_name] * bool(block_name))
     for text in wanted:
         matches = [column for name, column in known.items() if _is_match(text, name)]
         if not matches:
             raise ParameterError(
-                f"columns = {text!r} is no State or Output of an entity's plugin{nearest_name(text, known)}; "
+                f"columns = {text!r} is no State or Output of a plugin{nearest_name(text, known)}; "
                 f"there are: {listing(list(known)) or 'none'}"
             )
         if all(column.ragged for column in matches):
@@ -146,7 +151,8 @@ def _plugins(owner: Block | Plugin, path: tuple[str, ...] = ()) -> Iterator[tupl
 
 def _components(plugin: Any, column: Numbers) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Names and units of the components of a column; those without a name are counted."""
-    n = plugin.state_size(column.name) if isinstance(column, State) else len(column.fields)
+    sized = getattr(type(plugin), "state_size", None)  # world plugins have none
+    n = sized(plugin, column.name) if sized and isinstance(column, State) else len(column.fields)
     fields = column.fields + tuple(str(i) for i in range(len(column.fields), n))
     return fields, column.units + ("",) * (len(fields) - len(column.fields))
 
@@ -155,7 +161,7 @@ def _with_unique_names(sources: list[Source]) -> list[Source]:
     names = [source.column.name for source in sources]
     for source in sources:
         if names.count(source.column.name) > 1:
-            name = f"{'+'.join(sorted(source.blocks))}.{source.column.name}"
+            name = f"{'+'.join(sorted(source.blocks)) or 'world'}.{source.column.name}"
             source.column = replace(source.column, name=name)
     return sources
 
@@ -171,6 +177,7 @@ class ColumnReader:
     def __init__(self, sim: Any, sources: Sequence[Source]) -> None:
         self._state, self.sources = sim.state, sources
         self._bindings: dict[Any, list[Any]] = {}
+        self._world_plugins = {binding.spec.instance_name: binding for binding in sim.state.world_bindings}
 
     def read(self, parked: Any = None) -> list[Values]:
         """Values of each column for the rows of the body table, or for those of a world that has ended."""
@@ -185,6 +192,9 @@ class ColumnReader:
         found: list[Values] = []
         for number, source in enumerate(self.sources):
             column = source.column
+            if not source.blocks:
+                found.append((self._of_world(source, bodies, parked), np.ones(bodies.n, bool)))
+                continue
             values = np.zeros((len(column.parts), bodies.n), column.dtype)
             has_value = np.zeros(bodies.n, bool)
             for group, rows, arrays in tables:
@@ -196,6 +206,20 @@ class ColumnReader:
                 has_value[rows] = self._is_of(source, group, bodies.block[rows])
             found.append((values, has_value))
         return found
+
+    def _of_world(self, source: Source, bodies: Any, parked: Any) -> np.ndarray[Any, Any]:
+        """Values of a column of a world plugin, (k, n): of each entity, of its team, or of its world."""
+        binding = self._world_plugins[source.path[0]]
+        per, place = binding.places[source.attribute]
+        own = parked.of_world[source.path[0]] if parked else binding.tables
+        data: np.ndarray = own[per].arrays[place.dtype][place.first : place.first + max(1, place.k)]
+        if per == "entity":
+            return data
+        world = np.zeros(bodies.n, int) if parked else bodies.world
+        if type(binding.spec).columns[source.attribute].per == "team":
+            data = data[np.searchsorted(self._state.context.teams, bodies.team), world]
+            return data[None]
+        return np.take(data, world, axis=1)
 
     def _is_of(self, source: Source, group: Any, block: np.ndarray) -> Any:
         """Whether the column is recorded of the entities of a group, whose block numbers are given."""

@@ -117,11 +117,13 @@ def unrecorded(specification: Specification, mission: Mission) -> str:
 
 
 def columns_read(specification: Specification, mission: Mission) -> list[str]:
-    """Paths of the columns of plugins that a specification reads and a recorder can keep."""
+    """Paths of the columns of entities' plugins that a specification reads and a recorder can keep."""
     found = []
+    of_world = {plugin.instance_name for plugin in mission.world_plugins}
     for column in dict.fromkeys(signal.column for signal in specification.signals.values()):
-        with suppress(ParameterError):  # of the body table, or a parameter
-            found += [column] if column and select(mission, column) else []
+        if column and column.partition(".")[0] not in of_world:
+            with suppress(ParameterError):  # of the body table, or a parameter
+                found += [column] if select(mission, column) else []
     return found
 
 

@@ -182,7 +182,7 @@ def test_columns_of_plugins_are_recorded_and_analysed(here, folder):
     )
     code, _, err = here(*command, "--record-runs", "0:2", "--record-columns", "*.cuont")
     assert code == 1
-    assert "columns = '*.cuont' is no State or Output of an entity's plugin" in err
+    assert "columns = '*.cuont' is no State or Output of a plugin" in err
     assert not (folder / "out").exists()
     assert here(*command, "--record-columns", "*.count")[0] == 2
     assert here(*command, "--record-runs", "0:2")[0] == 0

@@ -10,7 +10,7 @@ import pytest
 from recorded_games import head_on, hunt, record
 
 from tussle import Block, Mission, Recorder, Simulation, load_run, read_table
-from tussle.api import Autonomy, EntityRef, Output, State
+from tussle.api import Autonomy, EntityRef, Interaction, Output, State
 from tussle.errors import DeclarationError, ParameterError, RecordError
 from tussle.record.plugin_columns import PluginColumn
 from tussle.record.schema import TRAJECTORY
@@ -137,6 +137,54 @@ def test_values_are_those_of_the_game_to_the_last_bit(tmp_path, seeds, update):
         np.testing.assert_array_equal(value, seen[key], err_msg=str(key))
 
 
+class Tally(Interaction):
+    """Has a state of each extent, which are told from world, step, team and id."""
+
+    visits = State(dtype=int, doc="How often it was visited.", recorded=True)
+    score = State(unit="s", per="team", doc="Of its team.", recorded=True)
+    place = State("x y", unit="m", per="world", doc="Of its world.")
+    is_old = State(dtype=bool)
+
+    def step(self, w):
+        self.visits[:] = w.id + 1000 * w.context.clock.step[w.world]
+        self.score[:] = w.teams[:, None] * w.context.clock.step
+        self.place[:] = w.context.seeds, w.context.clock.step
+        self.is_old[:] = w.id < 4
+
+
+@pytest.mark.parametrize("seeds", [(1,), (4, 5, 6)])
+def test_columns_of_world_plugins_are_those_of_the_entity_its_team_and_its_world(tmp_path, seeds):
+    """Through births, captures and ends of worlds at different times, their last states included."""
+    mission = hunt(n_prey=2, end=30.0)
+    mission = mission.replace(interactions=[*mission.interactions, Tally()])
+    sim = Simulation(mission, seeds=list(seeds))
+    with Recorder(sim, tmp_path / "run", columns="Tally.place,*.is_old"):
+        sim.run()
+    run = load_run(tmp_path / "run")
+    assert run.columns == {
+        "Tally.visits": PluginColumn("Tally.visits", int, doc="How often it was visited."),
+        "Tally.score": PluginColumn("Tally.score", float, units=("s",), doc="Of its team."),
+        "Tally.place": PluginColumn("Tally.place", float, ("x", "y"), ("m", "m"), "Of its world."),
+        "Tally.is_old": PluginColumn("Tally.is_old", bool),
+    }
+    world, step, who = (run.trajectory_table[name].to_numpy().astype(int) for name in ("world", "step", "id"))
+    _, first, which = np.unique([world, who], axis=1, return_index=True, return_inverse=True)
+    is_new, played = step == step[first][which], step > 0
+    assert is_new[played].any()
+    team = np.where(
+        np.isin(run.trajectory_table["block"].to_numpy(zero_copy_only=False), ["prey", "late"]), 1, 2
+    )
+    expected = {
+        "Tally.visits": np.where(is_new, 0, who + 1000 * (step - 1)), "Tally.score": team * (step - 1),
+        "Tally.place": np.stack([np.array(seeds)[world], step - 1], -1), "Tally.is_old": (who < 4) & ~is_new,
+    }  # fmt: skip
+    for name, values, is_there in recorded_columns(run):
+        assert is_there.all()
+        np.testing.assert_array_equal(
+            values[played].T, expected[name][played].T.reshape(-1, played.sum()), err_msg=name
+        )
+
+
 def test_rows_of_other_blocks_are_null_even_in_the_same_group(tmp_path):
     run = load_run(record(hunt(end=2.0), tmp_path / "run", columns="late.Boids.target"))
     ((name, _, is_there),) = recorded_columns(run)
@@ -229,7 +277,7 @@ def test_equal_names_of_different_columns_have_their_blocks_in_front(tmp_path):
         ("*.goal, *.nothing", r"columns = '\*.nothing' is no State .*there are: flock.Searcher.goal, Searcher.goal"),
         (["Searcher.goal", "prey.Searcher.goal"], r"columns = 'prey.Searcher.goal' .*did you mean 'Searcher.goal'"),
         ("flock.Searcher.seen", "columns = 'flock.Searcher.seen' is a list per entity; lists are not recorded"),
-        ("flock.pos", "columns = 'flock.pos' is no State or Output of an entity's plugin"),
+        ("flock.pos", "columns = 'flock.pos' is no State or Output of a plugin"),
     ],
 )  # fmt: skip
 def test_a_selector_that_selects_nothing_is_refused_before_anything_is_written(tmp_path, columns, said):
@@ -254,8 +302,6 @@ def test_what_has_no_value_per_entity_cannot_ask_to_be_recorded():
         State("x y", ragged=True, recorded=True)
     with pytest.raises(DeclarationError, match="Output: a ragged column is not recorded"):
         Output(ragged=True, recorded=True)
-    with pytest.raises(DeclarationError, match="State: a column per team is not recorded"):
-        State(per="team", recorded=True)
 
 
 def test_an_output_that_is_left_out_is_null_and_said_once(tmp_path):
