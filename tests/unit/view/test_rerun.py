@@ -102,9 +102,10 @@ def test_teams_are_counted_columns_are_told_and_events_are_words(written, hunted
     )
     alive = [k for k in range(hunted.n_frames) if hunted.frame(k).row_of(1) >= 0]
     targets = [hunted.values(k, "Boids.target")[hunted.frame(k).row_of(1)] for k in alive]
-    for axis, name in enumerate("xyz"):
-        told = written[f"/columns/prey/1/Boids/target/{name}", "Scalars:scalars"]
-        np.testing.assert_array_equal([v for _, (v,) in told], [target[axis] for target in targets])
+    told = written["/columns/prey/1/Boids/target", "Scalars:scalars"]
+    np.testing.assert_array_equal([v for _, v in told], targets)
+    names = [f"Boids.target.{axis}" for axis in "xyz"]
+    assert written["/columns/prey/1/Boids/target", "SeriesLines:names"] == [(None, names)]
     words = [text for _, (text,) in written["/events", "TextLog:text"]]
     assert len(words) == len(hunted.events)
     death = next(event for event in hunted.events if event.kind == "death")

@@ -4,7 +4,7 @@
 
 * `world/BLOCK/ID`: the model of each entity in its team's colour and its pose, from its birth to its removal;
 * `scenery/...`: bases, boundaries, terrain;
-* `teams/N`: entities left by team; `columns/BLOCK/ID/PLUGIN/NAME`: columns of plugins that were recorded;
+* `teams/N`: entities left by team; `columns/BLOCK/ID/PLUGIN/NAME`: columns of plugins that were recorded, with their components;
 * `events`: births, deaths, captures, collisions and the end in words.
 """
 
@@ -129,6 +129,7 @@ class _Writer:
         self._recording, self._stream, self._scale = recording, stream, scale
         self._blocks = {event.id: event.text for event in recording.events if event.kind == "birth"}
         self._alive = np.zeros(0, np.int32)
+        self._named: set[tuple[int, str]] = set()
         self.seen: set[int] = set()
 
     def put_scenery(self) -> None:
@@ -188,9 +189,13 @@ class _Writer:
             has = ~np.concatenate([np.ma.getmaskarray(each)[:, 0] for each in found])
             for who, own in rows.items():
                 there = own[has[own]]
-                for k, part in enumerate(column.parts if len(there) else ()):
-                    where = ["columns", *self._names(who), *part.split(".")]
-                    self._send_numbers(where, t[of[there]], values[there, k])
+                if not len(there):
+                    continue
+                where = ["columns", *self._names(who), *column.name.split(".")]
+                if (who, column.name) not in self._named:
+                    self._named.add((who, column.name))
+                    self._put(where, rr.SeriesLines(names=column.parts))
+                self._send_numbers(where, t[of[there]], values[there])
 
     def put_events(self) -> None:
         """Add all events in words."""
