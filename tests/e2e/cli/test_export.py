@@ -47,7 +47,7 @@ def test_all_outputs_at_once_lie_in_the_run(process, played):
     assert re.fullmatch(r"played/picture.png: 96×64, [\d.]+ k?B", next(x for x in lines if "png" in x))
     assert any(re.fullmatch(r"played/states.csv: 3\d\d states, [\d.]+ kB", line) for line in lines)
     assert all(
-        re.match(r"film: \d+/32 pictures, ", line) for line in said.stderr.splitlines()
+        re.match(r"film: \d+/16 pictures, ", line) for line in said.stderr.splitlines()
     )  # on a busy machine
     ffmpeg = imageio_ffmpeg.get_ffmpeg_exe()
     about = subprocess.run(
@@ -159,6 +159,26 @@ def test_what_cannot_be_done_is_told_in_one_line(tussle, played, folder):
         assert message in said.stderr
         assert said.stdout == ""
     assert not list((folder / "empty").iterdir())
+    before = {p.name: p.read_bytes() for p in played.iterdir()}
+    asked = {
+        "csv": "no/a.csv",
+        "parquet": "b",
+        "html": "b",
+        "kml": "c",
+        "mcap": "/",
+        "geojson": "played/run.json",
+    }
+    said = tussle("export", "played", *(f"--{kind}={file}" for kind, file in asked.items()), code=4)
+    assert [line.split(":")[0] for line in said.stdout.splitlines()] == ["b", "b.events.parquet"]
+    assert [line.removeprefix("error: ") for line in said.stderr.splitlines()] == [
+        "no/a.csv: cannot be written: No such file or directory",
+        "b: cannot be written: it is a file of --parquet; name another for --html",
+        "played/run.json: cannot be written: it is a file of the recording; name another for --geojson",
+        "played: the mission has no origin, so the run is nowhere on Earth; set <latitude_origin> and <longitude_origin> in played/mission.xml, or in the mission",  # noqa: E501
+        "/: cannot be written: it is a directory",
+        "note: not written: --csv, --html, --geojson, --kml, --mcap",
+    ]
+    assert {p.name: p.read_bytes() for p in played.iterdir()} == before
 
 
 @pytest.mark.needs("renderer")
