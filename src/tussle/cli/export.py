@@ -19,7 +19,7 @@ from tussle.cli.options import read_time
 from tussle.cli.progress import ProgressMeter, home_short
 from tussle.cli.terminal import INTERRUPTED, NOT_WRITTEN, OK, code_of, out, say, say_error, say_note
 from tussle.errors import ParameterError, TussleError, ViewError
-from tussle.record.run import FILES
+from tussle.record.schema import FILES
 from tussle.view.export.film import FilmOptions
 from tussle.view.recording import Recording
 
@@ -40,7 +40,8 @@ def plot(options: PlotOptions) -> int:
     runs = [run for path in (options.run, *(options.others or ())) for run in runs_of(path)]
     recording, *others = [Recording(run, options.world, tuple(options.plugin_files)) for run in runs]
     directory = options.directory or options.run / "plots"
-    failures, notes = _Failures(), {}
+    failures = _Failures()
+    notes: dict[str, None] = {}
     columns = [((), None, [name]) for name in dict.fromkeys(options.columns)]
     others_too = bool(options.kinds or options.between or not columns)
     for kinds, between, names in [*columns, *[(options.kinds, options.between, [])] * others_too]:
@@ -273,7 +274,7 @@ class _Exporter:
         recording = self.recording
         began = time.perf_counter()
         with ProgressMeter("film", "pictures") as meter:
-            report = write_film(recording, options=self._film, show=meter.show, **{kind: path})  # type: ignore[arg-type]
+            report = write_film(recording, options=self._film, show=meter.show, **{kind: path})
         wall = time.perf_counter() - began
         self._say_notes(report.notes)
         width, height = self._film.size

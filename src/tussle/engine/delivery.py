@@ -52,7 +52,9 @@ def _request_births(state: SimulationState, batch: Messages) -> None:
     numbers = {name: k for k, name in enumerate(view.templates)}
     number = np.array([numbers.get(str(block), -1) for block in batch.block], np.int64)
     problems = {
-        int(i): f"there is no block {batch.block[i]!r}{nearest_name(str(batch.block[i]), numbers)}; {listed(numbers)}"
+        int(
+            i
+        ): f"there is no block {batch.block[i]!r}{nearest_name(str(batch.block[i]), numbers)}; {listed(numbers)}"
         for i in np.flatnonzero(number < 0)
     }
     for name in ("pos", "vel", "quat"):
@@ -68,8 +70,8 @@ def _request_births(state: SimulationState, batch: Messages) -> None:
             view.spawn(view.templates[k], batch.world[index], **where)
     for i, text in sorted(problems.items()):
         if not state.failed[world := int(batch.world[i])]:
-            where = f"sent by entity {int(batch.sender[i])}"
-            state.record_failure(world, state.error(world, f"SpawnEntity: {text}", where=where))
+            sender = f"sent by entity {int(batch.sender[i])}"
+            state.record_failure(world, state.error(world, f"SpawnEntity: {text}", where=sender))
 
 
 def _request_deaths(state: SimulationState, batch: Messages) -> None:

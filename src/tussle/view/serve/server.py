@@ -161,7 +161,9 @@ class Server:
     async def _send(self, client: Client) -> None:
         while True:
             text = await client.waiting.get()
-            with suppress(ConnectionError):  # who is gone is not told, but heard to the end, which `_admit` waits for
+            with suppress(
+                ConnectionError
+            ):  # who is gone is not told, but heard to the end, which `_admit` waits for
                 await client.socket.send_str(text)
 
     # -- commands -------------------------------------------------------------------------------------------------------------------

@@ -44,9 +44,13 @@ class TrajectoryRecordPlayback(Autonomy):
     @classmethod
     def with_files(cls, given: Mapping[str, str], find: Callable[[str], Path]) -> dict[str, str]:
         """Return nothing: the file is below the current directory, where it must be if it is played."""
-        playing, name = (str(given.get(k, cls.params()[k].default)) for k in ("enable_playback", "trajectory_filename"))
+        playing, name = (
+            str(given.get(k, cls.params()[k].default)) for k in ("enable_playback", "trajectory_filename")
+        )
         if cls.params()["enable_playback"].convert(playing) and not Path(name).is_file():
-            raise MissingFileError(f"trajectory_filename = {name!r}: there is no such file below the current directory")
+            raise MissingFileError(
+                f"trajectory_filename = {name!r}: there is no such file below the current directory"
+            )
         return {}
 
     def check_values(self) -> None:
