@@ -161,9 +161,8 @@ class Server:
     async def _send(self, client: Client) -> None:
         while True:
             text = await client.waiting.get()
-            with suppress(
-                ConnectionError
-            ):  # who is gone is not told, but heard to the end, which `_admit` waits for
+            # A program that is gone gets nothing, but its queue is emptied: `_admit` waits for a place in it, and then leaves.
+            with suppress(ConnectionError):
                 await client.socket.send_str(text)
 
     # -- commands -------------------------------------------------------------------------------------------------------------------
