@@ -77,10 +77,10 @@ def whole_file(path: Path, suffix: str = ".part") -> Iterator[Path]:
     Raises:
         OSError: The file cannot be written, or there is a folder, a device, a pipe or a link, none of which is replaced.
     """
+    if os.path.lexists(path) and not stat.S_ISREG(path.lstat().st_mode):
+        raise OSError(f"it is {'a directory' if path.is_dir() else 'no regular file'}")
     part = path.with_name(f".{path.name}{suffix}")
     try:
-        if os.path.lexists(path) and not stat.S_ISREG(path.lstat().st_mode):
-            raise OSError(f"it is {'a directory' if path.is_dir() else 'no regular file'}")
         part.unlink(missing_ok=True)
         part.touch()
         yield part

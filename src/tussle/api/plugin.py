@@ -94,6 +94,12 @@ class Plugin:
     needed_services: ClassVar[tuple[str, ...]] = ()
     """Services that the plugin calls; a mission in which none offers them is refused."""
 
+    named_teams: ClassVar[tuple[str, ...]] = ()
+    """Parameters that are numbers of teams; a mission file that gives one without entities gets a note. Numbers below 1 are no teams."""
+
+    named_files: ClassVar[tuple[str, ...]] = ()
+    """Parameters that are paths of files, which are looked for when a mission file is read; it is refused without them."""
+
     columns: ClassVar[dict[str, Column]] = {}
     services: ClassVar[tuple[str, ...]] = ()
     row_laws: ClassVar[dict[str, RowLaw]] = {}
@@ -340,7 +346,7 @@ class Plugin:
 
     @classmethod
     def with_files(cls, given: Mapping[str, str], find: Callable[[str], Path]) -> dict[str, str]:
-        """Return attributes of a mission's tag that say where the files are that it names; by default none.
+        """Return attributes of a mission's tag that say where the files are that it names; by default those of `named_files`.
 
         Args:
             given: The attributes as written.
@@ -349,7 +355,7 @@ class Plugin:
         Raises:
             TussleError: A file is missing or wrong.
         """
-        return {}
+        return {name: str(find(given[name])) for name in cls.named_files if given.get(name)}
 
     def stand_in(self, is_moving: bool) -> tuple[str, dict[str, Any], str]:
         """Return name and parameters of a faster plugin that takes the place of this one in mission files; by default none, ("", {}, "").

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import MISSING, Field, dataclass, field, fields
 from importlib import import_module
-from inspect import Parameter, Signature
+from inspect import Parameter, Signature, signature
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any, get_args, get_type_hints
 
 import typer
 from typer.core import TyperCommand
@@ -80,9 +80,27 @@ class TussleCommand(TyperCommand):
                 raise typer.BadParameter(
                     f"{word!r} is not UTF-8 text; rename the file, or set a locale of UTF-8"
                 ) from None
+        if not ctx.resilient_parsing:
+            self._check_empty(args)
         # The word after an option's name is being completed: without this, the parser would stop before the mission.
         is_cut = ctx.resilient_parsing and bool(args) and any(args[-1] in each.opts for each in self.params)
         return super().parse_args(ctx, args[:-1] if is_cut else args)
+
+    def _check_empty(self, args: list[str]) -> None:
+        """Check that no path is an empty word, such as that of a variable of the shell which is not set: it would be the present folder.
+
+        Raises:
+            typer.BadParameter: One is.
+        """
+        asked = signature(self.callback).parameters if self.callback else {}
+        taking = {name: key for each in self.params for name in each.opts if (key := each.name) in asked}
+        paths = {name for name, key in taking.items() if "Path" in str(get_args(asked[key].annotation)[0])}
+        for before, word in zip(["", *args], args, strict=False):
+            name = word.removesuffix("=") if word else before
+            if name in paths and (word == "" or word.endswith("=")):
+                raise typer.BadParameter(f"{name} is empty; it takes a path")
+            if not word and not before.startswith("-"):
+                raise typer.BadParameter("an argument is empty; it takes a path or a name")
 
 
 def add_command(

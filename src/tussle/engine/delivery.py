@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from tussle.api.bodies import problems_of_states
 from tussle.api.links import Links
 from tussle.declare.comms import EVERYONE, SAME_ENTITY, TopicBuffer
 from tussle.declare.messages import ManualControl, Messages, RemoveEntity, SpawnEntity
@@ -50,19 +51,27 @@ def _request_births(state: SimulationState, batch: Messages) -> None:
     has_attitude = (batch.quat != 0.0).any(axis=0)
     numbers = {name: k for k, name in enumerate(view.templates)}
     number = np.array([numbers.get(str(block), -1) for block in batch.block], np.int64)
+    problems = {
+        int(
+            i
+        ): f"there is no block {batch.block[i]!r}{nearest_name(str(batch.block[i]), numbers)}; {listed(numbers)}"
+        for i in np.flatnonzero(number < 0)
+    }
+    for name in ("pos", "vel", "quat"):
+        for i, text in problems_of_states(name, getattr(batch, name)):
+            if name != "quat" or has_attitude[i]:
+                problems.setdefault(i, text)
+    number[list(problems)] = -1
     for k, with_attitude in sorted(set(zip(number.tolist(), has_attitude.tolist(), strict=True))):
         index = np.flatnonzero((number == k) & (has_attitude == with_attitude))
         attitude = {"quat": batch.quat[:, index]} if with_attitude else {}
         if k >= 0:
             where = {"pos": batch.pos[:, index], "vel": batch.vel[:, index], **attitude}
             view.spawn(view.templates[k], batch.world[index], **where)
-    for i in np.flatnonzero(number < 0):
-        block, world = batch.block[i], int(batch.world[i])
-        if not state.failed[world]:
-            text = f"SpawnEntity: there is no block {block!r}{nearest_name(str(block), view.templates)}; {listed(view.templates)}"
-            state.record_failure(
-                world, state.error(world, text, where=f"sent by entity {int(batch.sender[i])}")
-            )
+    for i, text in sorted(problems.items()):
+        if not state.failed[world := int(batch.world[i])]:
+            sender = f"sent by entity {int(batch.sender[i])}"
+            state.record_failure(world, state.error(world, f"SpawnEntity: {text}", where=sender))
 
 
 def _request_deaths(state: SimulationState, batch: Messages) -> None:

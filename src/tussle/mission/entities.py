@@ -164,6 +164,9 @@ class Fields:
         geodetic = ("latitude", "longitude", "altitude")
         given = [name for name in geodetic if self.has(name)]
         if len(given) == len(geodetic):
+            if origin.is_default:
+                text = "the mission has no <latitude_origin> and <longitude_origin>: <latitude> and <longitude> count from 29 N, 95 W"
+                self.problems.note(self.place("latitude"), text)
             angles = self.angles("latitude", "longitude")
             return tuple(float(v) for v in origin.from_geodetic(np.array([*angles, self.number("altitude")])))
         for name in given:

@@ -12,7 +12,7 @@ from typing import Any
 from tussle.api.plugin import Plugin
 from tussle.declare.columns import Param
 from tussle.declare.texts import shown
-from tussle.errors import MissionError, TussleError
+from tussle.errors import MissionError, TussleError, listed
 from tussle.mission import codecs
 from tussle.mission.catalogue import KINDS, AbsentPluginError, Catalogue, historic
 from tussle.mission.node import Budget, Node
@@ -74,6 +74,7 @@ class PluginReader:
         unread: Tags of <param_common> that a plugin does not read: place and name -> the arguments of `Problems.unknown`.
         read: Place and name of those that a plugin reads.
         shared_taken: Names of the <param_common> that a plugin takes.
+        teams: Teams that tags name: place, parameter, number.
         has_found: Whether attributes were added to tags, since they name files that were found.
         plays: Whether other plugins may stand in for those of the tags, since the mission is to be played.
     """
@@ -89,6 +90,7 @@ class PluginReader:
     read: set[tuple[Place, str]] = field(default_factory=set)
     shared_taken: set[str] = field(default_factory=set)
     has_found: bool = False
+    teams: list[tuple[Place, str, Any]] = field(default_factory=list)
     plays: bool = True
 
     def many(self, nodes: Iterable[Node], taken: set[str] | None = None) -> list[Any]:
@@ -134,6 +136,9 @@ class PluginReader:
                 self.problems.note(written.where(""), text)
         if not (is_right and is_found):
             return None
+        for each in cls.named_teams:
+            if str(values.get(each, "")).isdigit():
+                self.teams.append((written.where(each), f"{written.plugin}.{each}", int(values[each])))
         try:
             return cls(name=name, rate=rate, states=written.attributes.get("states"), **values)
         except TussleError as error:
@@ -209,6 +214,13 @@ class PluginReader:
             written.node.attributes |= found
             self.has_found = True
         return True
+
+    def report_teams(self, known: Iterable[int]) -> None:
+        """Report the teams that tags name and no block has."""
+        for place, parameter, team in self.teams:
+            if team > 0 and team not in known:
+                text = f"{parameter} = {team}: no <entity> has this team; {listed(map(str, sorted(known)))}"
+                self.problems.note(place, text)
 
     def report_unread(self) -> None:
         """Report the tags of <param_common> that no plugin reads. A plugin may take some that only others read."""

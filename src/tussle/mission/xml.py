@@ -233,12 +233,16 @@ class _WorldReader:
         self._count_tags(nodes)
         blocks = [entities.block(node, name) for node, name in zip(nodes, block_names(nodes), strict=True)]
         plugins.report_unread()
+        plugins.report_teams({block.team for block in blocks if block is not None})
         for node in root.find_all("param_common"):
             if node.attributes.get("name") not in plugins.shared_taken:
                 problems.note(node.place, "no plugin takes this <param_common>; it is ignored")
         if plugins.has_found:
             self.source.text = root.to_text()
         conditions, seed, reseed = self._end_conditions(), self._seed(), self._reseed()
+        if "time" in conditions and not times["end"] > times["start"]:
+            text = f"end {times['end']:g} s is not after start {times['start']:g} s: the game ends in its first step"
+            problems.note((self._last("run") or self.root).where("end"), text)
         parts = scene.parts()
         self._settings()
         self.viewer.pop("map", None)
@@ -344,6 +348,9 @@ class _WorldReader:
         if not nodes:
             return Origin()
         fields = Fields(Node("runscript", {}, "", nodes, self.root.place), WORLD, self.problems)
+        if len(missing := [name for name in names[:2] if not fields.has(name)]) == 1:
+            text = f"<{missing[0]}> is missing, and is taken to be {WORLD[missing[0]].default} degrees"
+            self.problems.note(nodes[0].place, text)
         return Origin(*fields.angles(names[0], names[1]), fields.number(names[2]))
 
     def _shared(self) -> dict[str, dict[str, Node]]:

@@ -21,7 +21,7 @@ HOOKS_NAMES = """
     spawn spawn_one step step_one start start_one result result_one route regions named_regions named_blocks needed_services walls terrain
     rejects from_body to_body mass_properties derivative advance active_inputs reads_all grade passthrough alters_sensors abstract kind
     historic_attributes transmit losses unused_states state_size range_kernel check_values reads_start_positions waits_for_traffic
-    awaits awaited with_files stand_in only_calls_kernels
+    awaits awaited with_files named_files named_teams stand_in only_calls_kernels
 """
 HOOKS = frozenset(HOOKS_NAMES.split())
 MACHINERY = frozenset({"columns", "services", "row_laws", "me_type", "world_types", "__signature__"})

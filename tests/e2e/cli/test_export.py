@@ -162,6 +162,36 @@ def test_what_cannot_be_done_is_told_in_one_line(tussle, played, folder):
         assert message in said.stderr
         assert said.stdout == ""
     assert not list((folder / "empty").iterdir())
+    before = {p.name: p.read_bytes() for p in played.iterdir()}
+    asked = {
+        "csv": "no/a.csv",
+        "parquet": "b",
+        "html": "b",
+        "kml": "c",
+        "mcap": "/",
+        "geojson": "played/run.json",
+    }
+    said = tussle("export", "played", *(f"--{kind}={file}" for kind, file in asked.items()), code=4)
+    assert [line.split(":")[0] for line in said.stdout.splitlines()] == ["b", "b.events.parquet"]
+    assert [line.removeprefix("error: ") for line in said.stderr.splitlines()] == [
+        "no/a.csv: cannot be written: No such file or directory",
+        "b: cannot be written: it is a file of --parquet; name another for --html",
+        "played/run.json: cannot be written: it is a file of the recording; name another for --geojson",
+        "played: the mission has no origin, so the run is nowhere on Earth; set <latitude_origin> and <longitude_origin> in played/mission.xml, or in the mission",  # noqa: E501
+        "/: cannot be written: it is a directory",
+        "note: not written: --csv, --html, --geojson, --kml, --mcap",
+    ]
+    assert {p.name: p.read_bytes() for p in played.iterdir()} == before
+
+
+@pytest.mark.needs("renderer")
+def test_a_film_is_written_beside_a_picture_that_cannot_be(tussle, played, folder):
+    arguments = "--gif", "a.gif", "--png", "no/a.png", "--size", "96x64", "--fps", "4"
+    said = tussle("export", "played", *arguments, code=4)
+    assert "no/a.png: cannot be written: No such file or directory" in said.stderr
+    assert said.stderr.endswith("note: not written: --png\n")
+    assert said.stdout.startswith("a.gif: ")
+    assert (folder / "a.gif").stat().st_size
 
 
 @pytest.mark.needs("renderer")

@@ -6,9 +6,14 @@ import os
 import resource
 import sys
 from contextlib import contextmanager
+from inspect import signature
 from pathlib import Path
+from typing import get_args
 
 import pytest
+from typer.main import get_command
+
+from tussle.cli.app import app
 
 LIMIT = 512
 """Bytes that a file may have on the disk that is full: fewer than any output takes."""
@@ -56,7 +61,7 @@ def test_outputs_on_a_full_disk_leave_nothing_and_over_a_pipe_or_a_link_leave_th
     before = sorted(folder.rglob("*"))
     for kind, command in OUTPUTS.items():
         with full_disk(monkeypatch):
-            said = tussle(*command, code=1 if kind in ("convert", "new", "plot") else 4).stderr
+            said = tussle(*command, code=1 if kind in ("convert", "new") else 4).stderr
         assert "cannot be written: " in said, kind
         assert "bug" not in said, said
         assert sorted(folder.rglob("*")) == before, kind
@@ -64,10 +69,33 @@ def test_outputs_on_a_full_disk_leave_nothing_and_over_a_pipe_or_a_link_leave_th
         for put in (os.mkfifo, lambda path: path.symlink_to("/dev/full")):
             put(target)
             found = target.lstat()
-            said = tussle(*command, code=1 if kind in ("convert", "new", "plot") else 4).stderr
+            said = tussle(*command, code=1 if kind in ("convert", "new") else 4).stderr
             assert (
                 "it is no regular file" if kind not in ("convert", "new") else "exists already"
             ) in said, kind
             assert os.path.samestat(target.lstat(), found), kind
             target.unlink()
     assert Path("/dev/full").is_char_device()
+
+
+def test_an_empty_path_of_any_command_is_refused(tussle, folder):
+    """That of a variable of the shell which is not set would be the present folder."""
+    before = sorted(folder.iterdir())
+    n_refused = 0
+    for command in get_command(app).commands.values():
+        asked = signature(command.callback).parameters
+        for option in command.params:
+            if (
+                "Path" not in str(get_args(asked[option.name].annotation)[0])
+                if option.name in asked
+                else True
+            ):
+                continue
+            for words in (
+                ([option.opts[0], ""], [f"{option.opts[0]}="]) if option.opts[0].startswith("-") else ([""],)
+            ):
+                said = tussle(command.name, *words, code=2)
+                assert "is empty; it takes a path" in said.stderr, (command.name, words, said)
+                n_refused += 1
+    assert n_refused > 60
+    assert sorted(folder.iterdir()) == before

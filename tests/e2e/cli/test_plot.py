@@ -53,6 +53,9 @@ def test_what_it_cannot_do_is_told_in_one_line(tussle, played, folder):
         assert "Traceback" not in said.stderr
         assert code == 2 or len(said.stderr.splitlines()) == 1
     assert not (played / "plots").exists()
+    said = tussle("plot", "played", "--column", "hight", "--column", "z", "--kind", "left", code=1)
+    assert said.stdout.splitlines() == ["played/plots/z.png", "played/plots/left.png"]
+    assert said.stderr.startswith("error: played: there is no column 'hight'")
 
 
 def test_a_run_that_was_cut_is_plotted_and_it_is_said(tussle, played):

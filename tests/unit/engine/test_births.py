@@ -457,6 +457,23 @@ def test_births_by_message_of_several_blocks_get_the_same_ids_in_any_stack():
     assert stack.read("x.id")[0][:, 0].tolist() == [2, 2, 3]
 
 
+@pytest.mark.parametrize("interactions", [[], [SimpleCollision()]])
+@pytest.mark.parametrize(
+    ("state", "message"),
+    [
+        ({"pos": (0, 0, np.inf)}, "pos is not finite"),
+        ({"vel": (np.nan, 0, 0)}, "vel is not finite"),
+        ({"quat": (2, 0, 0, 0)}, "quat has the length 2"),
+        ({"quat": (np.nan, 0, 0, 0)}, "quat is not finite"),
+    ],
+)
+def test_asking_with_a_state_that_is_none_names_who_asked(state, message, interactions):
+    sim = Simulation(mission(block("a"), interactions=interactions))
+    sim.publish(SpawnEntity, block="a", **state)
+    with pytest.raises(PluginError, match=f"^sent by entity 0, world 0, step 0: SpawnEntity: {message}"):
+        sim.step()
+
+
 def test_asking_for_a_block_that_is_not_there_ends_that_world_only():
     game = asking(template="chil")
     sim = Simulation(game, seeds=[1, 2, 3], params={"a.Asker.at": [99, 4, 99]})

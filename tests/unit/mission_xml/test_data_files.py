@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import re
+
 import pytest
 
+from tussle.api import MotionModel
 from tussle.errors import MissingFileError, MissionError
+from tussle.mission.catalogue import KINDS
 from tussle.mission.data_files import VARIABLE, DataFiles, data_folders
+from tussle.plugins import stock
 
 PIXELS = "P2 3 2 255 0 255 100 0 255 255"
 MAP = """<params><filename>wall.pgm</filename><resolution>0.5</resolution><x_origin>10</x_origin><y_origin>20</y_origin>
@@ -154,3 +159,51 @@ def test_terrains_are_found_at_any_depth(files, data):
     folder.mkdir()
     (folder / "hills.asc").write_text("ncols 2\nnrows 2\nxllcorner 0\nyllcorner 0\ncellsize 1\n1 2\n3 4\n")
     assert files.world("<terrain>hills.asc</terrain>", search=[data]).mission.scene.terrain is not None
+
+
+def naming(pattern):
+    """Tag, plugin and parameter of each parameter of a stock plugin that is called so and is no truth."""
+    for cls in map(stock.load, stock.manifest()):
+        tag = next(tag for tag, kind in KINDS.items() if issubclass(cls, kind))
+        for name, column in cls.params().items():
+            if (
+                re.search(pattern, name)
+                and not isinstance(column.default, bool)
+                and not issubclass(cls, MotionModel)
+            ):
+                yield tag, cls, name
+
+
+def tagged(tag, cls, attributes, files):
+    text = f"<{tag} {attributes}>{cls.__name__}</{tag}>"
+    is_inside = tag in ("autonomy", "sensor", "controller")
+    return files.world("" if is_inside else text, "<team_id>1</team_id>" + text * is_inside)
+
+
+OWNED = {"Boundary"}
+"""Plugins whose team is that of a thing, not of entities."""
+
+
+def test_a_team_that_no_entity_has_is_noted_of_whatever_plugin_names_it(files):
+    named = [each for each in naming(r"(^|_)team(_id)?$") if each[1].__name__ not in OWNED]
+    assert len(named) >= 9
+    for tag, cls, name in named:
+        note = f"{cls.__name__}.{name} = 99: no <entity> has this team; there are: 1"
+        assert any(note in each for each in tagged(tag, cls, f'{name}="99"', files).notes), note
+        assert not any("has this team" in each for each in tagged(tag, cls, f'{name}="1"', files).notes)
+
+
+def test_a_file_that_is_missing_refuses_the_mission_of_whatever_plugin_names_it(files):
+    named = [each for each in naming(r"_file(name)?$") if each[2] != "csv_filename"]  # which is written
+    assert {"GraphInteraction", "TrajectoryRecordPlayback", "MOOSAutonomy"} <= {
+        cls.__name__ for _, cls, _ in named
+    }
+    for tag, cls, name in named:
+        playing = 'enable_playback="1"' if "enable_playback" in cls.params() else ""
+        with pytest.raises(MissionError, match=rf"m\.xml:\d+: {cls.__name__}: .*no (such )?file .*"):
+            tagged(tag, cls, f'{name}="nowhere.x" {playing}', files)
+    (files.folder / "roads.graphml").write_text("<graphml/>")
+    (roads,) = files.world(
+        "<entity_interaction graph_file='roads.graphml'>GraphInteraction</entity_interaction>"
+    ).mission.interactions
+    assert roads.graph_file == str(files.folder / "roads.graphml")

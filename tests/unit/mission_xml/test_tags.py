@@ -82,6 +82,25 @@ def test_an_end_between_two_steps_is_noted(files):
     assert not any("whole number of steps" in n for n in files.world().notes)
 
 
+@pytest.mark.parametrize(
+    ("tags", "inside", "note"),
+    [
+        ('<run start="5" end="2"/>', "", "end 2 s is not after start 5 s"),
+        ('<run start="2" end="2"/>', "", "end 2 s is not after start 2 s"),
+        ('<run start="2" end="2"/><end_condition>one_team</end_condition>', "", None),
+        ("<latitude_origin>35</latitude_origin>", "", "<longitude_origin> is missing, and is taken to be -95"),
+        ("<longitude_origin>35</longitude_origin>", "", "<latitude_origin> is missing, and is taken to be 29"),
+        ("", "<latitude>1</latitude><longitude>2</longitude><altitude>3</altitude>", "count from 29 N, 95 W"),
+        ("<latitude_origin>1</latitude_origin><longitude_origin>2</longitude_origin>",
+         "<latitude>1</latitude><longitude>2</longitude><altitude>3</altitude>", None),
+    ],
+)  # fmt: skip
+def test_a_game_that_is_not_where_or_when_it_seems_is_noted(files, tags, inside, note):
+    notes = files.world(tags, inside).notes
+    assert bool(note) == any((note or "N, 95 W") in each for each in notes)
+    assert note or not any("is not after" in each or "is missing" in each for each in notes)
+
+
 def test_end_conditions_are_words_of_a_list(files):
     assert files.world("<end_condition>time, all_dead one_team</end_condition>").mission.end_conditions == (
         "time",

@@ -18,6 +18,7 @@ import numpy as np
 import pytest
 
 from tussle import Block, Mission, Simulation
+from tussle.api import Metric
 from tussle.mission import read_mission
 from tussle.serve import Server
 from tussle.stock import GoTo, SimpleCollision, SingleIntegrator
@@ -207,6 +208,47 @@ def test_a_client_that_reads_nothing_costs_no_memory(server):
             await asyncio.sleep(0.001)
 
     talk(server, conversation)
+
+
+def test_a_client_that_crashes_while_answers_wait_leaves_its_place(server):
+    async def ask_on(ask):
+        while True:
+            await ask.socket.send_json({"do": "now", "id": "x" * 100_000})
+
+    async def conversation(ask):
+        asking = asyncio.create_task(ask_on(ask))
+        while not (server._clients and server._clients[0].waiting.full()):
+            await asyncio.sleep(0.01)
+        await asyncio.sleep(0.3)  # until the next answer waits for a place
+        asking.cancel()
+        ask.socket._response.connection.transport.abort()
+        for _ in range(1000):
+            await asyncio.sleep(0.02 * bool(server._clients))
+        assert not server._clients
+
+    talk(server, conversation)
+
+
+class Unknown(Metric):
+    def result(self, w):
+        return {"time": np.full(w.n_worlds, np.nan), "range": np.full(w.n_worlds, np.inf)}
+
+
+def test_all_that_is_sent_is_json():
+    def refuse(name):
+        raise AssertionError(f"{name} is no JSON")
+
+    async def conversation(ask):
+        answers = []
+        for text in ('{"do": "result"}', '{"do": "now", "id": NaN}', '{"do": "now", "id": [1e999]}'):
+            await ask.socket.send_str(text)
+            answers.append(json.loads((await ask.socket.receive()).data, parse_constant=refuse))
+        return answers
+
+    with Simulation(mission(metrics=[Unknown()])) as simulation, Server(simulation) as server:
+        result, *now = talk(server, conversation)
+    assert result["worlds"][0]["metrics"] == {"Unknown": {"time": None, "range": None}}
+    assert [each["id"] for each in now] == [None, [None]]
 
 
 @pytest.mark.filterwarnings("error")

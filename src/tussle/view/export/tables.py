@@ -26,7 +26,7 @@ from tussle.record.schema import (
     TRAJECTORY_FILE,
     TRAJECTORY_RULES,
 )
-from tussle.view.export.whole_file import whole_file
+from tussle.view.export.whole_file import unwritable, whole_file
 
 KINDS = ("csv", "parquet")
 ROWS_OF_A_GROUP = 1 << 18
@@ -78,6 +78,8 @@ def write_tables(
     place, target = run_directory(run), Path(path)
     report = TablesReport()
     _check(place, world, report)
+    if not target.name:
+        raise unwritable(target, "it is a directory")
     beside = target.with_name(f"{target.stem}.events{target.suffix or '.' + kind}")
     tables = (
         (TRAJECTORY_FILE, TRAJECTORY, TRAJECTORY_RULES, target, show),

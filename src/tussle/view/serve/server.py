@@ -8,6 +8,7 @@ import math
 import time
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any, Self, TypeVar
@@ -19,7 +20,7 @@ from tussle.pacing import Pace
 from tussle.view.pacing import checked_warp
 from tussle.view.page.access import MAX_BROWSERS, Access, bound_socket
 from tussle.view.page.web_server import WebServer
-from tussle.view.serve.session import ENCODINGS, Session, encoded
+from tussle.view.serve.session import ENCODINGS, Session, as_json, encoded
 
 if TYPE_CHECKING:
     from aiohttp import web
@@ -66,7 +67,7 @@ class Client:
         if self.waiting.full():
             self.n_dropped += 1
             return
-        self.waiting.put_nowait(json.dumps(state | {"dropped": self.n_dropped}))
+        self.waiting.put_nowait(as_json(state | {"dropped": self.n_dropped}))
         self.n_dropped = 0
 
 
@@ -151,7 +152,7 @@ class Server:
         try:
             async for message in socket:
                 if isinstance(message.data, str):
-                    await client.waiting.put(json.dumps(await self._answer(client, message.data)))
+                    await client.waiting.put(as_json(await self._answer(client, message.data)))
         finally:
             self._clients.remove(client)
             sender.cancel()
@@ -159,7 +160,10 @@ class Server:
 
     async def _send(self, client: Client) -> None:
         while True:
-            await client.socket.send_str(await client.waiting.get())
+            text = await client.waiting.get()
+            # A program that is gone gets nothing, but its queue is emptied: `_admit` waits for a place in it, and then leaves.
+            with suppress(ConnectionError):
+                await client.socket.send_str(text)
 
     # -- commands -------------------------------------------------------------------------------------------------------------------
 

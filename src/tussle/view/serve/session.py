@@ -52,6 +52,14 @@ def encoded(values: Any, encoding: str) -> Any:
     return array.tolist()
 
 
+def as_json(message: Any) -> str:
+    """A message as JSON, in which numbers that are not finite are null: those of a metric, or of a client's id."""
+    try:
+        return json.dumps(message, allow_nan=False)
+    except ValueError:
+        return json.dumps(json.loads(json.dumps(message), parse_constant=lambda _: None))
+
+
 class Session:
     """Executes commands on a simulation. Each public method is a command; its arguments are the fields of the message.
 

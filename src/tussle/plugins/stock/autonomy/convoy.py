@@ -44,6 +44,7 @@ class Convoy(Autonomy):
     """
 
     grade = "portable"
+    named_teams = ("intruder_team",)
 
     gap = Param(30.0, unit="m", ge=0.0, doc="Distance of the goal behind the vehicle ahead.")
     sight = Param(250.0, unit="m", ge=0.0, doc="Distance below which intruders are seen.")
@@ -77,6 +78,7 @@ class Escort(Autonomy):
     """
 
     grade = "portable"
+    named_teams = ("intruder_team",)
 
     sight = Param(60.0, unit="m", ge=0.0, doc="Distance below which its own sensor sees intruders.")
     capture_range = Param(10.0, unit="m", ge=0.0, doc="Distance below which an intruder is claimed.")

@@ -23,6 +23,7 @@ class HoldFormation(Autonomy):
     """
 
     grade = "portable"
+    named_teams = ("leader_team",)
 
     leader_team = Param(2, doc="Team of the leaders.")
     shape = Param("vee", choices=("vee", "line", "column"), doc="Shape of the formation.")

@@ -19,6 +19,7 @@ class Ground(Interaction):
     """The ground level, and who is on it; abstract: `_carry` is the law of what it does not remove."""
 
     grade = "portable"
+    named_teams = ("team",)
 
     ground_collision_z = Param(0.0, unit="m", doc="Ground level above the origin's tangent plane.")
     ground_collision_altitude = Param(
@@ -34,6 +35,11 @@ class Ground(Interaction):
     is_down = State(
         dtype=bool, per="entity", doc="Whether an entity was at or below the ground level in the last step."
     )
+
+    def check_values(self) -> None:
+        """Check the team."""
+        if self.team != "all":
+            self._team()
 
     def start(self, w: WorldView) -> None:
         self.step(w)

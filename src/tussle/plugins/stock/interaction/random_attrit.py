@@ -17,6 +17,7 @@ class RandomAttrit(Interaction):
     """
 
     grade = "portable"
+    named_teams = ("team",)
     most_per_step: ClassVar[int] = 2**62
 
     decay_method = Param("linear", choices=("linear",), doc="How the number decreases.")

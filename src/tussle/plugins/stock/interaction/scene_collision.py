@@ -18,6 +18,7 @@ class SceneCollision(Interaction):
     """
 
     grade = "portable"
+    named_teams = ("team",)
 
     margin = Param(
         0.0,

@@ -17,6 +17,7 @@ class CPA(Metric):
     """
 
     grade = "portable"
+    named_teams = ("team_id",)
     historic_attributes = HistoricAttributes(unread=("ground_collisions",))
 
     team_cpa = Param(False, structural=True, doc="Measure distances to team mates only.")

@@ -18,6 +18,7 @@ class Predator(Autonomy):
     """
 
     grade = "portable"
+    named_teams = ("prey_team_id",)
     only_calls_kernels = True
 
     max_speed = Param(30.0, unit="m/s", ge=0.0, doc="Desired speed.")

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import numpy as np
 
 from tussle.api import Autonomy, GroupView, HistoricAttributes, Output, Param, Publish
 from tussle.declare.messages import RemoveEntity
-from tussle.errors import ParameterError, listed
+from tussle.errors import MissingFileError, ParameterError, listed
 from tussle.numeric.quaternion import quat_to_yaw
 from tussle.plugins import stock
 from tussle.plugins.stock.autonomy.trajectory_record_playback.table import read_recorded
@@ -39,6 +40,18 @@ class TrajectoryRecordPlayback(Autonomy):
     desired_altitude = Output(unit="m")
     desired_speed = Output(unit="m/s")
     velocity = Output("velocity_x velocity_y velocity_z", unit="m/s")
+
+    @classmethod
+    def with_files(cls, given: Mapping[str, str], find: Callable[[str], Path]) -> dict[str, str]:
+        """Return nothing: the file is below the current directory, where it must be if it is played."""
+        playing, name = (
+            str(given.get(k, cls.params()[k].default)) for k in ("enable_playback", "trajectory_filename")
+        )
+        if cls.params()["enable_playback"].convert(playing) and not Path(name).is_file():
+            raise MissingFileError(
+                f"trajectory_filename = {name!r}: there is no such file below the current directory"
+            )
+        return {}
 
     def check_values(self) -> None:
         """Check that the file is below the current directory or ships, since a mission may come from others."""

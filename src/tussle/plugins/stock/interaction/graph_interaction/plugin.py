@@ -31,6 +31,7 @@ class GraphInteraction(Interaction):
     """
 
     grade = "portable"
+    named_files = ("graph_file",)
     historic_attributes = HistoricAttributes(renamed={"id": "graph_id"}, unread=("data",))
 
     graph_id = Param(1, structural=True, doc="Id of the graph in its message.")

@@ -37,6 +37,7 @@ class RadioNetwork(Network):
     """
 
     grade = "portable"
+    named_teams = ("jammer_team",)
     losses = ("queue", "plane", "fading", "jammed", "half_duplex", "chance", "blocked")
 
     range = Param(
