@@ -94,7 +94,8 @@ def entry(name: str, value: Any) -> str:
     if name == "__version__":
         return f"**{name}**: version of the installation, a text\n\n"
     if not (inspect.isclass(value) or callable(value)):
-        return f"**{name}**: {', '.join(value) if isinstance(value, Mapping) else repr(value)}\n\n"
+        shown = repr(value).replace("pathlib._local.", "pathlib.")  # as Python 3.13 calls it
+        return f"**{name}**: {', '.join(value) if isinstance(value, Mapping) else shown}\n\n"
     lines = [f"### {name}\n"]
     if not is_declared(value):
         lines.append(f"`{name}{signature(value)}`\n")
