@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from tussle.api.world import WorldView
+from tussle.arguments import explained
 from tussle.declare.messages import Messages
 from tussle.numeric.segments import order_by_row
 
@@ -15,6 +16,7 @@ BLOCKS = ("nothing", "scene", "scene and entities")
 """Kinds of obstacles between a sender and a receiver."""
 
 
+@explained
 class Links:
     """Each message of a step with each other entity within reach of its sender, as `Network.transmit` returns them.
 

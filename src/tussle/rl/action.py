@@ -12,6 +12,7 @@ from gymnasium import spaces
 
 from tussle.api import Autonomy, GroupView, Output
 from tussle.api.kinds import EntityPlugin
+from tussle.arguments import check_fields
 from tussle.declare.columns import Param
 from tussle.errors import ParameterError, listed, nearest_name
 from tussle.mission import Block
@@ -52,10 +53,7 @@ class Act:
         Raises:
             ParameterError: The target does not exist, or the values do not fit together.
         """
-        if not isinstance(self.target, str):
-            raise ParameterError(
-                f"Act: target = {self.target!r} is not allowed; it takes the name of a channel"
-            )
+        check_fields(self)
         is_range = _is_finite(self.low) and _is_finite(self.high)
         given = [is_range and self.low != self.high, self.levels is not None, self.value is not None]
         if sum(given) != 1 or (not is_range and (self.low, self.high) != (None, None)):

@@ -12,6 +12,7 @@ from gymnasium import spaces
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
+from tussle.arguments import explained
 from tussle.errors import ParameterError, listed, nearest_name
 from tussle.rl.episodes import checked_seeds, is_whole
 from tussle.rl.swarm import Swarm, task_of
@@ -364,6 +365,7 @@ def make(task: Any, *, render_mode: str | None = None, threads: int = 1) -> Task
     return TaskEnv(task, render_mode=render_mode, threads=threads)
 
 
+@explained
 def register(name: str, task: Any) -> None:
     """Register a task with Gymnasium, for `gymnasium.make(name)` and `gymnasium.make_vec(name)`."""
     gymnasium.register(

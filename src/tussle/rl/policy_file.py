@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from tussle.arguments import explained
 from tussle.errors import MissingExtraError, ParameterError, listed
 
 TASK_KEY = "tussle.task"
@@ -16,6 +17,7 @@ TASK_KEY = "tussle.task"
 ACTIVATIONS = ("Tanh", "Relu", "Sigmoid", "Elu")
 
 
+@explained
 def write_policy(
     path: str | Path, layers: Sequence[tuple[Any, Any]], *, task: str = "", activation: str = "Tanh"
 ) -> None:

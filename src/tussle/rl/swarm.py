@@ -10,7 +10,9 @@ from typing import Any, Self
 
 import numpy as np
 
+from tussle.arguments import explained
 from tussle.batch.variables import Choice, Range
+from tussle.documents import Whole, check_argument
 from tussle.engine.simulation import Simulation
 from tussle.errors import ParameterError, SnapshotError, WiringError, listed
 from tussle.rl.episodes import Episodes, checked_params, checked_seeds, checked_value, checked_worlds
@@ -69,8 +71,7 @@ class Swarm:
         self.task = task = task_of(task)
         if autoreset not in AUTORESET:
             raise ParameterError(f"autoreset = {autoreset!r} is not allowed; {listed(AUTORESET)}")
-        if isinstance(num_envs, bool) or int(num_envs) != num_envs or num_envs < 1:
-            raise ParameterError(f"num_envs = {num_envs!r} is not allowed; it takes a whole number >= 1")
+        check_argument("num_envs", num_envs, Whole(1))
         self.autoreset, self.n_worlds, self.n_agents = autoreset, int(num_envs), len(task.agent_names)
         worlds, shape, dtype = self.n_worlds, (self.n_worlds, self.n_agents), task.dtype
         width = max(sum(widths) for widths in task.widths.values())
@@ -513,6 +514,7 @@ def make_swarm(task: Any, num_envs: int = 1, *, autoreset: str = "same_step", th
     return Swarm(task, num_envs, autoreset=autoreset, threads=threads)
 
 
+@explained
 def record_episode(
     task: Any, policy: Callable[[np.ndarray], Any], directory: str | Path, *, seed: int = 1
 ) -> dict[str, float]:
@@ -543,6 +545,7 @@ def record_episode(
     return sums
 
 
+@explained
 def evaluate(
     task: Any, policy: Callable[[np.ndarray], Any] | None = None, n_episodes: int = 100, *, seed: int = 1, threads: int = 1
 ) -> dict[str, np.ndarray]:  # fmt: skip
