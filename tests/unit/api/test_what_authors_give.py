@@ -221,9 +221,7 @@ def test_a_function_names_the_argument_of_another_type():
         ),
         "motion = None is not allowed; it takes a MotionModel": lambda: Problem(**{**gap, "motion": None}),
         "start = [1] is not allowed; it takes values by name": lambda: Problem(**{**gap, "start": [1]}),
-        "bounds of 'x' = 1 is not allowed; it takes 2 values: a number, a number": lambda: Problem(
-            **{**gap, "bounds": {"x": 1}}
-        ),
+        "bounds = [1] is not allowed; it takes values by name": lambda: Problem(**{**gap, "bounds": [1]}),
         "scene = None is not allowed; it takes a Scene": lambda: Problem(**{**gap, "scene": None}),
     }
     for text, call in calls.items():

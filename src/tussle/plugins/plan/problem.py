@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from tussle.api import MotionModel
-from tussle.arguments import check_kind, kinds_of
-from tussle.documents import POSITIVE, Checked, Either, Real, Whole, check_argument
+from tussle.arguments import check_kind
+from tussle.documents import POSITIVE, Checked, Either, Real, Whole, check_argument, problem
 from tussle.errors import ParameterError, listed, nearest_name
 from tussle.world.scene import Scene
 
@@ -71,8 +71,9 @@ class Problem:
     longest: int = 20
 
     def __post_init__(self) -> None:
-        for key in ("motion", "start", "bounds", "commands", "held", "scene"):
-            check_kind(key, getattr(self, key), kinds_of(Problem)[key])
+        mappings = dict.fromkeys(("start", "bounds", "commands", "held"), Mapping)
+        for key, kind in {"motion": MotionModel, "scene": Scene, **mappings}.items():
+            check_kind(key, getattr(self, key), kind)
         name = type(self.motion).__name__
         self.check_names("start", self.start, self.fields)
         self.check_names("bounds", self.bounds, self.fields)
@@ -104,7 +105,8 @@ class Problem:
     def _check_start(self) -> None:
         """Raise a `ParameterError` if no plan can begin at the start."""
         for name, given in self.start.items():
-            check_argument(f"start: {name}", given, Real())
+            if problem(given.item() if isinstance(given, np.generic) else given, Real()):
+                raise ParameterError(f"start: {name} = {given!r} is not a finite number")
         for name, value in zip(self.fields, self.first.tolist(), strict=True):
             low, high = self.bounds.get(name, (-np.inf, np.inf))
             if not low <= value <= high:
