@@ -27,6 +27,7 @@ NOUNS = {
     bool: "true or false",
     str: "a text",
     NoneType: "None",
+    Any: "anything",
     Iterable: "a list",
     Callable: "a function",
     np.ndarray: "an array",
@@ -36,18 +37,16 @@ PYTHON_ERRORS = (TypeError, AttributeError, ValueError, LookupError)
 """What Python and NumPy raise where a value of another type is used."""
 
 
-def check_fields(given: Any, where: str = "") -> None:
+def check_fields(given: Any) -> None:
     """Check the fields of a dataclass by their annotations.
 
     Raises:
-        ParameterError: A value is of another type; the message begins with `where`, by default the name of the class.
+        ParameterError: A value is of another type.
     """
     cls: Any = type(given)
     kinds = kinds_of(cls)
     for each in fields(given):
-        check_kind(
-            f"{where or type(given).__name__}: {each.name}", getattr(given, each.name), kinds[each.name]
-        )
+        check_kind(f"{cls.__name__}: {each.name}", getattr(given, each.name), kinds[each.name])
 
 
 def check_kind(name: str, value: Any, kind: Any, error: type[TussleError] = ParameterError) -> None:
@@ -67,8 +66,8 @@ def check_kind(name: str, value: Any, kind: Any, error: type[TussleError] = Para
 def explained(function: Decorated) -> Decorated:
     """A function whose Python errors name the argument that is of another type than its annotation, and say what it takes.
 
-    The types are looked at where a call has failed; a call that succeeds costs nothing more. A class stands for its public methods; for
-    its constructor, and with `DeclarationError`, where it has no others.
+    The types are looked at where a call has failed; a call that succeeds costs nothing more. A class stands for its public methods. An
+    `__init__`, which is that of a declaration, raises a `DeclarationError`.
     """
     if isinstance(function, type):
         for name, each in vars(function).copy().items():

@@ -119,8 +119,9 @@ def _check_links(links: Links, losses: tuple[str, ...]) -> None:
         wrong = outcome[(outcome < 0) | (outcome > len(losses))][0] - 1
         known = listed(f"{i} ({name})" for i, name in enumerate(losses))
         raise WiringError(f"transmit lost links for the reason number {wrong}; in losses {known}")
-    is_delay = np.shape(delay) == outcome.shape and np.asarray(delay).dtype.kind in "iuf"
-    if delay is not None and (not is_delay or np.isnan(delay).any()):
+    if delay is not None and (
+        np.shape(delay) != outcome.shape or np.asarray(delay).dtype.kind not in "iuf" or np.isnan(delay).any()
+    ):
         raise WiringError(
             f"transmit returned links with delay = {clipped(repr(delay))}; it takes numbers [s], {outcome.shape}, one per link"
         )

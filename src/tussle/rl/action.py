@@ -61,7 +61,9 @@ class Act:
                 f"Act({self.target!r}): give finite low and high that differ, or levels, or value"
             )
         if self.levels is not None and (
-            len(self.levels) < 2 or np.size(self.levels) != len(self.levels) * len(self.names)
+            len(self.levels) < 2
+            or np.size(array_of(f"Act({self.target!r}): levels", self.levels))
+            != len(self.levels) * len(self.names)
         ):
             raise ParameterError(
                 f"Act({self.target!r}): levels are two or more rows of {len(self.names)} number(s)"
@@ -79,6 +81,18 @@ class Act:
                 raise ParameterError(
                     f"Act: {block.name} has no channel {name!r}{nearest_name(name, channels)}; {listed(channels)}"
                 )
+
+
+def array_of(what: str, given: Any) -> np.ndarray:
+    """What a learner or a function of the user gave, as an array.
+
+    Raises:
+        ParameterError: Its rows have different lengths.
+    """
+    try:
+        return np.asarray(given)
+    except ValueError as error:
+        raise ParameterError(f"{what}: no array can be made of it: {error}") from None
 
 
 def _is_finite(value: Any) -> bool:

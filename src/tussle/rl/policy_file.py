@@ -58,7 +58,10 @@ def write_policy(
         raise ParameterError(
             f"write_policy: activation = {activation!r} is not allowed; {listed(ACTIVATIONS)}"
         )
-    arrays = [(np.asarray(w, np.float32), np.asarray(b, np.float32)) for w, b in layers]
+    try:
+        arrays = [(np.asarray(w, np.float32), np.asarray(b, np.float32)) for w, b in layers]
+    except ValueError as error:
+        raise ParameterError(f"write_policy: layers are no arrays of numbers: {error}") from None
     shapes = [w.shape for w, _ in arrays]
     if (
         not arrays

@@ -13,6 +13,7 @@ from tussle.arguments import check_fields, explained
 from tussle.errors import ParameterError, listed, nearest_name
 from tussle.record.events import CAPTURE, COLLISION, DEATH, FLAG
 from tussle.rl import kernels
+from tussle.rl.action import array_of
 from tussle.rl.observation import TEAMS, AgentRows, Component, Means, NearestOthers, block_numbers
 
 if TYPE_CHECKING:
@@ -284,7 +285,7 @@ class Term:
         Raises:
             ParameterError: The values have another shape, or are not finite numbers.
         """
-        values = np.asarray(self.function(now))
+        values = array_of("returns a list", self.function(now))
         worlds, agents = out.shape
         if values.shape not in ((), (worlds, agents), (worlds, 1), (1, agents)):
             raise ParameterError(

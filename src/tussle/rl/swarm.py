@@ -15,6 +15,7 @@ from tussle.batch.variables import Choice, Range
 from tussle.documents import Whole, check_argument
 from tussle.engine.simulation import Simulation
 from tussle.errors import ParameterError, SnapshotError, WiringError, listed
+from tussle.rl.action import array_of
 from tussle.rl.episodes import Episodes, checked_params, checked_seeds, checked_value, checked_worlds
 from tussle.rl.observation import AgentRows, Each
 from tussle.rl.reward import COUNTED, NOBODY, Situation
@@ -36,6 +37,7 @@ def task_of(task: Any) -> Task:
     return made
 
 
+@explained
 class Swarm:
     """The agents of a task in W worlds, A in each, as arrays (W, A, ...), which the next `step` or `reset` overwrites.
 
@@ -328,8 +330,9 @@ class Swarm:
             self._states[0] = self._of_worlds()
         if self.masks is None:
             return
-        given = np.asarray(self.task.action_mask(self.now))
-        where, shape = f"{type(self.task).__name__}.action_mask", self.masks.shape
+        where = f"{type(self.task).__name__}.action_mask"
+        given = array_of(where, self.task.action_mask(self.now))
+        shape = self.masks.shape
         try:
             self.masks[:] = np.broadcast_to(given, shape)
         except ValueError:
@@ -376,7 +379,7 @@ class Swarm:
         self.over[worlds] = self.late[worlds] = False
 
     def _act(self, actions: Any) -> None:
-        given = np.asarray(actions)
+        given = array_of("actions", actions)
         shape = (self.n_worlds, self.n_agents, self.action_width)
         if given.shape == shape[:2] and self.action_width == 1:
             given = given[..., None]
@@ -420,7 +423,7 @@ class Swarm:
         np.copyto(self.terminations, now.died)
         over = self._are_decided() if self._check_ends else np.zeros(self.n_worlds, bool)
         if not self._never_ends:
-            ends = np.asarray(task.ends(now))
+            ends = array_of(f"{type(task).__name__}.ends", task.ends(now))
             if ends.shape not in ((), over.shape) or ends.dtype != bool:
                 raise ParameterError(
                     f"{type(task).__name__}.ends returns {ends.dtype} of shape {ends.shape}; "
@@ -474,7 +477,7 @@ class Swarm:
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """Return to a state of this swarm, or of another one with the same task and number of worlds."""
-        self.simulation.restore(state["simulation"])
+        self.simulation.restore(state.get("simulation"))
         self.episodes.restore(state["episodes"])
         self._ints = self._told = None
         self._look()
@@ -565,6 +568,7 @@ def evaluate(
         ParameterError: No autonomies play the agents' blocks.
     """
     task = task_of(task)
+    check_argument("n_episodes", n_episodes, Whole(1))
     if policy is None:
         task = task.by_rule()
         idle = np.zeros((n_episodes, len(task.agent_names), 0), task.dtype)

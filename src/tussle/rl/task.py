@@ -133,6 +133,10 @@ class Task:
                         f"{where}: {attribute}: there is no block {name!r}{nearest_name(str(name), known)}; {listed(known)}"
                     )
                 check_argument(f"{where}: {attribute} of {name!r}", value, rule)
+        if not self.agent_names:
+            raise ParameterError(
+                f"{where}: {self.learners!r} has no agents; give the blocks a count, or room"
+            )
         if self.state is not None:
             self.state.check()
         if self.has_mask and any(d.is_continuous for d in self.decoders):
