@@ -477,7 +477,8 @@ class Swarm:
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """Return to a state of this swarm, or of another one with the same task and number of worlds."""
-        self.simulation.restore(state.get("simulation"))
+        saved: Any = state.get("simulation")
+        self.simulation.restore(saved)
         self.episodes.restore(state["episodes"])
         self._ints = self._told = None
         self._look()
