@@ -39,6 +39,7 @@ from tussle.aircraft.metrics import offer_metrics, read_metrics
 from tussle.aircraft.node import Element
 from tussle.aircraft.propulsion import RUNTIME, Propulsion, read_propulsion
 from tussle.errors import ParameterError, clipped, nearest_name
+from tussle.folders import whole_file
 from tussle.numeric import store
 from tussle.numeric.kernel import Device, Kernel, jitted, renamed
 from tussle.numeric.source import define
@@ -277,5 +278,6 @@ def save_source(aircraft: CompiledAircraft) -> Path:
     path = store.directory() / f"aircraft-{store.file_stem(aircraft.name)}-{digest}.py"
     if not path.exists():
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(aircraft.source, encoding="utf-8")
+        with whole_file(path) as part:
+            part.write_text(aircraft.source, encoding="utf-8")
     return path

@@ -24,6 +24,7 @@ from tussle.api.bodies import (
 from tussle.api.context import Context, stream
 from tussle.api.draw import Draw
 from tussle.api.pairs import Nearest, Pairs, find_nearest, find_pairs
+from tussle.arguments import Array, explained
 from tussle.documents import Whole, check_argument
 from tussle.errors import DeclarationError, ParameterError, PluginError, listed, nearest_name
 from tussle.numeric import rng
@@ -36,6 +37,7 @@ GOLDEN = np.uint64(0x9E3779B97F4A7C15)
 LAWS: dict[str, Callable[..., np.ndarray]] = {"uniform": rng.uniform, "normal": rng.normal}
 
 
+@explained
 class GroupView:
     """Rows [first, last) of the body table: all entities, of all worlds, with the same plugins.
 
@@ -254,6 +256,7 @@ class GroupView:
 
     def who(self, row: int) -> str:
         """Block, id and world of a row, for messages."""
+        check_argument("who: row", row, Whole(0, self.n - 1))
         name = self.context.block_names[int(self.block[row])]
         return f"{name} {int(self.id[row])} of world {int(self.world[row])}"
 
@@ -382,7 +385,7 @@ class GroupView:
         return find_nearest(self._bodies, (self.first, self.last), self.pos, k, teams, among)
 
     def cast(
-        self, origins: Any, directions: Any, max_range: Any = np.inf, *, row: np.ndarray | None = None,
+        self, origins: Array, directions: Array, max_range: Array = np.inf, *, row: np.ndarray | None = None,
         world: np.ndarray | None = None, entities: bool = True,
     ) -> Hits:  # fmt: skip
         """The first hits of rays on the scene and on the other entities: spheres of their radius, or boxes where the block has one.
@@ -409,7 +412,7 @@ class GroupView:
         return np.asarray(world), np.full(len(world), -1)
 
     def height(
-        self, x: Any, y: Any, *, row: np.ndarray | None = None, world: np.ndarray | None = None
+        self, x: Array, y: Array, *, row: np.ndarray | None = None, world: np.ndarray | None = None
     ) -> np.ndarray:
         """Height of the highest surface at places x, y [m], (m,): of the scene, or of another entity; -inf where there is none.
 
@@ -421,7 +424,7 @@ class GroupView:
         return casting.height(self.context, self._bodies, x, y, *self._askers(row, world))
 
     def free(
-        self, points: Any, radius: Any, *, row: np.ndarray | None = None, world: np.ndarray | None = None
+        self, points: Array, radius: Array, *, row: np.ndarray | None = None, world: np.ndarray | None = None
     ) -> np.ndarray:
         """Return True if spheres round points [m], (3, m), touch neither the scene nor another entity, and lie inside of none, (m,).
 
@@ -439,7 +442,7 @@ class GroupView:
         return casting.free(self.context, self._bodies, points, radius, *self._askers(row, world))
 
     def is_clear(
-        self, a: Any, b: Any, *, row: np.ndarray | None = None, world: np.ndarray | None = None
+        self, a: Array, b: Array, *, row: np.ndarray | None = None, world: np.ndarray | None = None
     ) -> np.ndarray:
         """Return True if neither the scene nor another entity lies between points a and b [m], (3, m) each; (m,).
 

@@ -8,13 +8,16 @@ from typing import Any
 import numpy as np
 
 from tussle.api.world import WorldView
+from tussle.arguments import explained
 from tussle.declare.messages import Messages
+from tussle.errors import ParameterError
 from tussle.numeric.segments import order_by_row
 
 BLOCKS = ("nothing", "scene", "scene and entities")
 """Kinds of obstacles between a sender and a receiver."""
 
 
+@explained
 class Links:
     """Each message of a step with each other entity within reach of its sender, as `Network.transmit` returns them.
 
@@ -53,12 +56,21 @@ class Links:
 
     def keep(self, where: np.ndarray) -> None:
         """Keep the links where `where`, (m,), is true; the others are not within reach."""
+        self._check_marks("keep", where)
         self.message, self.receiver = self.message[where], self.receiver[where]
         self.distance, self.outcome = self.distance[where], self.outcome[where]
 
     def lose(self, reason: int, where: np.ndarray) -> None:
         """Mark the links where `where`, (m,), is true as lost for a reason, unless they are lost already."""
+        self._check_marks("lose", where)
         self.outcome[where & (self.outcome == 0)] = 1 + reason
+
+    def _check_marks(self, what: str, where: np.ndarray) -> None:
+        if np.shape(where) != self.outcome.shape or np.asarray(where).dtype != bool:
+            raise ParameterError(
+                f"{what}: where is {np.asarray(where).dtype} of shape {np.shape(where)}; it takes truth values, "
+                f"{self.outcome.shape}, one per link"
+            )
 
     def uniform(self, w: WorldView, label: str) -> np.ndarray:
         """Uniform draws in [0, 1), (m,), keyed by sender, message and receiver; other entities do not affect them."""
@@ -99,6 +111,7 @@ class Links:
 
     def lose_by_chance(self, w: WorldView, reason: int, label: str, share: np.ndarray) -> None:
         """Mark links as lost for a reason, so that only a share of the messages in each world, (n_worlds,), is not."""
+        share = np.broadcast_to(share, w.n_worlds)
         if (share < 1.0).any():
             self.lose(reason, self.uniform(w, label) >= share[self.world[self.message]])
 

@@ -11,6 +11,7 @@ from tussle.api.bodies import IN_PLACE, Bodies, BodyView, problems_of_states
 from tussle.api.context import Context, stream
 from tussle.api.group import GOLDEN, LAWS, GroupView
 from tussle.api.mass import MassProperties
+from tussle.arguments import explained
 from tussle.declare.comms import TopicBuffer
 from tussle.declare.messages import Message, Messages
 from tussle.errors import MissionError, ParameterError, PluginError, listed, nearest_name
@@ -32,6 +33,7 @@ class WorldBodies(BodyView):
         return super().__getattr__(name)
 
 
+@explained
 class WorldView(GroupView):
     """All rows of all worlds. One view is shared by all world plugins.
 

@@ -36,6 +36,7 @@ def league(options: LeagueOptions) -> int:
     scipy_package()
     from tussle.rl.league import League
     from tussle.rl.league_page import record_game, write_league_page
+    from tussle.rl.policy_file import kept_file
 
     planned = League(
         options.task, options.players.split(","), games=options.games, seed=options.seed, plugin_files=options.plugin_files
@@ -72,7 +73,8 @@ def league(options: LeagueOptions) -> int:
             return interrupt.code
     page = write_league_page(planned, standings, directory, replays)
     text = json.dumps(standings.as_dict(), indent=1)
-    (directory / JSON).write_text(text + "\n", encoding="utf-8")
+    with kept_file(directory / JSON) as part:
+        part.write_text(text + "\n", encoding="utf-8")
     if options.as_json:
         typer.echo(text)
     else:

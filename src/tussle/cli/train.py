@@ -83,6 +83,8 @@ def draw_curve(
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
+    from tussle.rl.policy_file import kept_file
+
     figure = Figure(figsize=(7, 5), layout="constrained")
     FigureCanvasAgg(figure)
     upper, lower = figure.subplots(2, sharex=True)
@@ -99,4 +101,5 @@ def draw_curve(
         lower.legend()
     upper.set(title=title, ylabel="reward per decision")
     lower.set(xlabel="decisions", ylabel="return of an episode")
-    figure.savefig(path, dpi=120)
+    with kept_file(path) as part:
+        figure.savefig(part, dpi=120, format="png")

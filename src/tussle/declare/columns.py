@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from tussle.arguments import explained
 from tussle.declare import texts, units
 from tussle.declare.displays import line, page, shortened, table
 from tussle.errors import DeclarationError, ParameterError, UnitError, nearest_name
@@ -37,6 +38,10 @@ class Column:
 
     name: str = ""
     owner: str = ""
+
+    def __init_subclass__(cls) -> None:
+        if "__init__" in vars(cls):
+            cls.__init__ = explained(cls.__init__)  # type: ignore[method-assign]
 
     def __init__(self, *, doc: str = "") -> None:
         self.doc = doc

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any, overload
 
 from tussle.api.group import GroupView
+from tussle.arguments import check_kind, explained
 from tussle.errors import ParameterError, listed, nearest_name
 
 
@@ -27,6 +28,7 @@ class Call:
     views: tuple[GroupView, ...] = ()
 
 
+@explained
 class Schedule(Sequence[Call]):
     """The calls of a step, in order.
 
@@ -101,6 +103,7 @@ class Schedule(Sequence[Call]):
             raise ParameterError(
                 f"before = {before!r}, after = {after!r}: exactly one of them is a name of a call"
             )
+        check_kind("insert: call", call, Callable[[Any], object])
         label = name or str(getattr(call, "__name__", type(call).__name__))
         owner = self._owner
 

@@ -14,7 +14,7 @@ from tussle.engine import failure
 from tussle.engine.manual import request_control
 from tussle.engine.state import SimulationState
 from tussle.engine.world_bindings import WorldBinding
-from tussle.errors import ParameterError, WiringError, listed, nearest_name
+from tussle.errors import ParameterError, WiringError, clipped, listed, nearest_name
 
 
 def deliver(state: SimulationState) -> None:
@@ -88,7 +88,13 @@ def _send(state: SimulationState, network: WorldBinding, topics: list[TopicBuffe
     try:
         routes = network.plugin.transmit(view, [topic.outbox() for topic in topics])
         if isinstance(routes, Links):
+            _check_links(routes, network.plugin.losses)
             _post_links(state, network, topics, routes)
+        elif not isinstance(routes, list | tuple) or len(routes) != len(topics):
+            raise WiringError(
+                f"transmit returned {clipped(repr(routes))}; it must return Links, or a list of what "
+                "route returns, one per topic"
+            )
         else:
             for topic, to in zip(topics, routes, strict=True):
                 _post(state, network, topic, to)
@@ -99,7 +105,7 @@ def _send(state: SimulationState, network: WorldBinding, topics: list[TopicBuffe
 def _post(state: SimulationState, network: WorldBinding, topic: TopicBuffer, to: Any) -> None:
     """Queue the messages of a topic for receivers as `Network.route` returns them."""
     clock, batch = state.context.clock, topic.outbox()
-    if not isinstance(to, str):
+    if isinstance(to, tuple) and len(to) == 2:
         number, rows = to
         to = (np.asarray(number, np.int64), state.population.bodies.id[np.asarray(rows, np.int64)])
     elif to not in (EVERYONE, SAME_ENTITY):
@@ -111,11 +117,31 @@ def _post(state: SimulationState, network: WorldBinding, topic: TopicBuffer, to:
         topic.post(batch, to, clock.step[batch.world] + steps)
 
 
+def _check_links(links: Links, losses: tuple[str, ...]) -> None:
+    """Check the links that a network returns.
+
+    Raises:
+        WiringError: Links are lost for an unknown reason, or their delays are no numbers.
+    """
+    outcome, delay = links.outcome, links.delay
+    if len(outcome) and not 0 <= outcome.min() <= outcome.max() <= len(losses):
+        wrong = outcome[(outcome < 0) | (outcome > len(losses))][0] - 1
+        known = listed(f"{i} ({name})" for i, name in enumerate(losses))
+        raise WiringError(f"transmit lost links for the reason number {wrong}; in losses {known}")
+    if delay is not None and (
+        np.shape(delay) != outcome.shape or np.asarray(delay).dtype.kind not in "iuf" or np.isnan(delay).any()
+    ):
+        raise WiringError(
+            f"transmit returned links with delay = {clipped(repr(delay))}; it takes numbers [s], {outcome.shape}, one per link"
+        )
+
+
 def _post_links(
     state: SimulationState, network: WorldBinding, topics: list[TopicBuffer], links: Links
 ) -> None:
     """Count the links of a network, and queue the messages that are received."""
-    _count_links(state, network, topics, links)
+    if network.plugin.losses:
+        _count_links(state, network, topics, links)
     own = np.flatnonzero((links.sender >= 0) & links.reaches_sender)
     received = np.flatnonzero(links.outcome == 0)
     number = np.concatenate([own, links.message[received]])

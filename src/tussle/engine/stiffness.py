@@ -1,7 +1,8 @@
-"""Refuses rigid bodies whose equations change too fast for the substeps of a mission."""
+"""Equations that change too fast for the substeps of a mission: rigid bodies are refused, other motion models are noted."""
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,6 +23,10 @@ CHANGE = 1e-6
 N_TRIED = 10
 """Substeps after which such a body is refused if its numbers are not finite; a symmetric one, to which nothing happens, may fly on."""
 BISECTIONS = 60
+MAX_PARTS = 64
+"""Largest number of parts of a substep that are tried."""
+CLOSE = 1.1
+"""Factor up to which two factors of growth are the same."""
 
 
 @dataclass
@@ -38,20 +43,46 @@ class TrialSteps:
     dt: float
     u: np.ndarray
 
-    def growth(self, row: int, p: np.ndarray) -> float:
-        """Return the largest factor by which a substep of a row with parameters p, (q,), enlarges a change of its state."""
+    def growth(self, row: int, p: np.ndarray, n: int = 1, size: float = CHANGE) -> float:
+        """Return the largest factor by which a substep, in n parts, of a row with parameters p, (q,), enlarges a change of its state."""
         start = self.group.x[:, row]
         m = len(start)
-        change = CHANGE * np.maximum(1.0, np.abs(start))
+        change = size * np.maximum(1.0, np.abs(start))
         x = np.repeat(start[:, None], m + 1, axis=1)
         x[range(m), range(m)] += change
         given = [np.repeat(each[:, None], m + 1, axis=1) for each in (self.u[:, row], p)]
         with np.errstate(all="ignore"):
-            self.group.integrate(x, *given, self.dt, 1)
+            self.group.integrate(x, *given, self.dt, n)
             jacobian = (x[:, :m] - x[:, m:]) / change
         return (
             float(np.abs(np.linalg.eigvals(jacobian)).max()) if np.isfinite(jacobian).all() else float("inf")
         )
+
+    def advice(self, row: int) -> str:
+        """Say that a substep of a row is too long, and what would be short enough: "" if it is not, or its equations are not smooth there.
+
+        Too long is a substep that enlarges a change more than shorter ones do, in which the method of Runge and Kutta is exact.
+        """
+        p, parts = self.group.p[:, row], [2**k for k in range(MAX_PARTS.bit_length())]
+        growth = self.growth(row, p)
+        if (
+            not CLOSE < growth < np.inf
+            or not growth / CLOSE < self.growth(row, p, 1, 10.0 * CHANGE) < CLOSE * growth
+        ):
+            return ""
+        *others, last = [self.growth(row, p, n) for n in parts]
+        is_known = last / CLOSE <= max(1.0, others[-1]) <= CLOSE * max(1.0, last) < np.inf
+        enough = next(
+            (n for n, each in zip(parts, others, strict=False) if each <= CLOSE * max(1.0, last)), MAX_PARTS
+        )
+        if is_known and enough == 1:
+            return ""
+        better = (
+            f"{enough} times as large a motion_multiplier is enough there"
+            if is_known
+            else "dt has to be much shorter"
+        )
+        return f"at its start, each enlarges a change of the state by a factor of {growth:.3g}; {better}"
 
     def stays_finite(self, row: int) -> bool:
         """Whether the state is finite after some substeps without inputs."""
@@ -84,6 +115,9 @@ class TrialSteps:
 def check_stiffness(state: SimulationState) -> None:
     """Refuse the worlds in which a rigid body at its start changes so fast that no substep can follow, such as one of nearly no mass.
 
+    Of other models with a `derivative`, those whose substeps are too long at the start are noted: the method of Runge and Kutta then
+    enlarges each change of a state, which the equations do not.
+
     Raises:
         MissionError: There is one, in a stack of one world.
         PluginError: There is one, in another stack whose errors are raised.
@@ -91,17 +125,17 @@ def check_stiffness(state: SimulationState) -> None:
     dt = state.mission.dt / state.mission.motion_multiplier
     for group in state.population.groups:
         cls = type(group.motion.spec)
-        if (
-            not group.n
-            or not issubclass(cls, RigidBodyModel)
-            or cls.derivative is None
-            or cls.advance is not MotionModel.advance
-        ):
+        if not group.n or cls.derivative is None or cls.advance is not MotionModel.advance:
             continue
         trial = TrialSteps(group, dt, group.inputs_of_body())
-        for row in _unlike_rows(group, trial.u):
-            if trial.growth(row, group.p[:, row]) > MAX_GROWTH and not trial.stays_finite(row):
-                name = f"{group.motion.spec.instance_name} of block {group.block_of(row)!r}"
+        is_rigid = issubclass(cls, RigidBodyModel)
+        for row in _unlike_rows(group, trial.u, group.x[3:6] if is_rigid else group.x):
+            name = f"{group.motion.spec.instance_name} of block {group.block_of(row)!r}"
+            if not is_rigid and (advice := trial.advice(row)):
+                text = f"{name} is too stiff for substeps of {dt:g} s (dt / motion_multiplier): {advice}"
+                warnings.warn(text, RuntimeWarning, stacklevel=3)
+                break
+            if is_rigid and trial.growth(row, group.p[:, row]) > MAX_GROWTH and not trial.stays_finite(row):
                 text = (
                     f"{name} changes too fast for substeps of {dt:g} s (dt / motion_multiplier), by {trial.reason(row)}; its numbers would "
                     "not be finite after a few steps"
@@ -112,12 +146,12 @@ def check_stiffness(state: SimulationState) -> None:
                 state.record_failure(world, state.error(world, text))
 
 
-def _unlike_rows(group: Group, u: np.ndarray) -> list[int]:
-    """The first row, the fastest, and those with the least and largest value of each parameter that differs."""
+def _unlike_rows(group: Group, u: np.ndarray, state: np.ndarray) -> list[int]:
+    """The first row, that with the largest number of a part of the state, and those with the extremes of each parameter that differs."""
     given = np.concatenate([group.p, u])
     differs = given[(given != given[:, :1]).any(axis=1)]
-    speed = np.abs(group.x[3:6]).max(axis=0)
-    found = [0, int(speed.argmax()), *differs.argmin(axis=1).tolist(), *differs.argmax(axis=1).tolist()]
+    largest = int(np.abs(state).max(axis=0).argmax())
+    found = [0, largest, *differs.argmin(axis=1).tolist(), *differs.argmax(axis=1).tolist()]
     return sorted(set(found))
 
 

@@ -12,6 +12,7 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.csv
 
+from tussle.arguments import explained
 from tussle.declare.displays import MAX_LINE, counted, line, listing, page, shortened, table
 from tussle.documents import DAMAGED, MAX_BYTES, read_text
 from tussle.errors import MissingExtraError, ParameterError, RecordError, listed, nearest_name
@@ -258,6 +259,7 @@ class Run:
         )
 
 
+@explained
 def load_run(path: str | Path, frames: str = "", *, is_mapped: bool = False) -> Run:
     """Load a run directory. Of a run that is still going on or was killed, load what was written.
 

@@ -12,6 +12,7 @@ from gymnasium import spaces
 
 from tussle.api import Autonomy, GroupView, Output
 from tussle.api.kinds import EntityPlugin
+from tussle.arguments import check_fields
 from tussle.declare.columns import Param
 from tussle.errors import ParameterError, listed, nearest_name
 from tussle.mission import Block
@@ -52,10 +53,7 @@ class Act:
         Raises:
             ParameterError: The target does not exist, or the values do not fit together.
         """
-        if not isinstance(self.target, str):
-            raise ParameterError(
-                f"Act: target = {self.target!r} is not allowed; it takes the name of a channel"
-            )
+        check_fields(self)
         is_range = _is_finite(self.low) and _is_finite(self.high)
         given = [is_range and self.low != self.high, self.levels is not None, self.value is not None]
         if sum(given) != 1 or (not is_range and (self.low, self.high) != (None, None)):
@@ -63,7 +61,9 @@ class Act:
                 f"Act({self.target!r}): give finite low and high that differ, or levels, or value"
             )
         if self.levels is not None and (
-            len(self.levels) < 2 or np.size(self.levels) != len(self.levels) * len(self.names)
+            len(self.levels) < 2
+            or np.size(array_of(f"Act({self.target!r}): levels", self.levels))
+            != len(self.levels) * len(self.names)
         ):
             raise ParameterError(
                 f"Act({self.target!r}): levels are two or more rows of {len(self.names)} number(s)"
@@ -81,6 +81,18 @@ class Act:
                 raise ParameterError(
                     f"Act: {block.name} has no channel {name!r}{nearest_name(name, channels)}; {listed(channels)}"
                 )
+
+
+def array_of(what: str, given: Any) -> np.ndarray:
+    """What a learner or a function of the user gave, as an array.
+
+    Raises:
+        ParameterError: Its rows have different lengths.
+    """
+    try:
+        return np.asarray(given)
+    except ValueError as error:
+        raise ParameterError(f"{what}: no array can be made of it: {error}") from None
 
 
 def _is_finite(value: Any) -> bool:

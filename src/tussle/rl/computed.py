@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from tussle.arguments import check_fields
+from tussle.documents import Whole, check_argument
 from tussle.errors import ParameterError
 from tussle.rl.observation import AgentRows, Component
 
@@ -41,6 +43,8 @@ class Computed(Component):
         Raises:
             ParameterError: They do not fit.
         """
+        check_fields(self)
+        check_argument("Computed: n", self.n, Whole(1))
         if np.shape(self.low) not in ((), (self.n,)) or np.shape(self.high) not in ((), (self.n,)):
             raise ParameterError(f"Computed: low and high are one number, or {self.n} numbers")
         if not ((np.array(self.low) <= 0.0) & (np.array(self.high) >= 0.0)).all():

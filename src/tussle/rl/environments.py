@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 import warnings
+from collections.abc import Mapping
 from typing import Any
 
 import gymnasium
@@ -12,7 +13,9 @@ from gymnasium import spaces
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
+from tussle.arguments import check_kind, explained
 from tussle.errors import ParameterError, listed, nearest_name
+from tussle.rl.action import array_of
 from tussle.rl.episodes import checked_seeds, is_whole
 from tussle.rl.swarm import Swarm, task_of
 from tussle.rl.task import Task
@@ -62,6 +65,7 @@ def in_parts(task: Task, seen: np.ndarray, block: int = 0) -> Any:
 
 def check_options(options: Any, known: tuple[str, ...] = OPTIONS) -> dict[str, Any]:
     """Options of a reset; warns of those that have no effect."""
+    check_kind("options", options, Mapping[str, Any] | None)
     given = dict(options or {})
     for name in given:
         if name not in known:
@@ -249,7 +253,7 @@ class TaskVectorEnv(VectorEnv[Any, Any, Any]):
     def step(self, actions: Any) -> tuple[Any, Any, Any, Any, dict[str, Any]]:
         """Play one decision in all worlds; rewards are sums over agents."""
         swarm = self.swarm
-        given = np.asarray(actions)
+        given = array_of("actions", actions)
         if swarm.n_agents == 1:
             if given.shape != self.action_space.shape:
                 raise ParameterError(
@@ -311,7 +315,7 @@ class TaskEnv(gymnasium.Env[Any, Any]):
 
     def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         """Play one decision; the reward is the sum over agents."""
-        given = np.asarray(action)
+        given = array_of("the action", action)
         if given.shape != self.action_space.shape:
             raise ParameterError(
                 f"the action has shape {given.shape}; the shape must be {self.action_space.shape}"
@@ -364,8 +368,15 @@ def make(task: Any, *, render_mode: str | None = None, threads: int = 1) -> Task
     return TaskEnv(task, render_mode=render_mode, threads=threads)
 
 
+@explained
 def register(name: str, task: Any) -> None:
-    """Register a task with Gymnasium, for `gymnasium.make(name)` and `gymnasium.make_vec(name)`."""
+    """Register a task with Gymnasium, for `gymnasium.make(name)` and `gymnasium.make_vec(name)`.
+
+    Raises:
+        ParameterError: It is no task.
+    """
+    if not (isinstance(task, type) and issubclass(task, Task)):
+        task_of(task)
     gymnasium.register(
         id=name,
         entry_point="tussle.rl.environments:TaskEnv",

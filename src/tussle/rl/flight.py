@@ -71,7 +71,18 @@ class Policy:
         self.task = session.get_modelmeta().custom_metadata_map.get(TASK_KEY, "")
         self.width, self.n_out = self._checked(session.get_inputs()), self._checked(session.get_outputs())
         self._names = session.get_inputs()[0].name, session.get_outputs()[0].name
-        self._run(np.zeros((BATCH, self.width), np.float32))
+        self._check_rows()
+
+    def _check_rows(self) -> None:
+        """Refuse a network in which a row depends on others, or on chance: a world would depend on its stack."""
+        rows = np.sin(np.arange(BATCH * self.width)).astype(np.float32).reshape(BATCH, self.width)
+        one = self._run(rows)
+        rows[1::2] = 0.0
+        other = self._run(rows)
+        if one.shape != (BATCH, self.n_out) or not np.array_equal(one[::2], other[::2], equal_nan=True):
+            raise self._refused(
+                "outputs of a row depend on other rows or on chance; a policy decides for each agent by its observation alone"
+            )
 
     def _refused(self, why: str) -> ParameterError:
         return ParameterError(f"Learned.policy = {self.path!r}: {why}")
@@ -237,14 +248,14 @@ class LearnedFlight:
         for k in np.unique(which):
             out[which == k] = self.policies[k](obs[which == k])
         if not self._decoder.is_continuous:
-            out[~allowed] = -np.inf
             edges = np.cumsum(self._decoder.sizes)[:-1]
-            parts = np.split(out, edges, axis=1)
-            stuck = np.flatnonzero([(part == -np.inf).all(axis=1) for part in parts])
+            stuck = np.flatnonzero([~free.any(axis=1) for free in np.split(allowed, edges, axis=1)])
             if len(stuck):
                 row = int(due[stuck[0] % len(due)])
                 g.fail(row, f"action_mask of {type(self.task).__name__} leaves {g.who(row)} no level")
+            parts = np.split(np.where(allowed | np.isnan(out), out, -np.inf), edges, axis=1)
             actions = np.stack([part.argmax(axis=1) for part in parts], axis=1)
+            actions[~np.all([part.max(axis=1) > -np.inf for part in parts], axis=0)] = -1
         else:
             actions = out.astype(float)
         wrong = self._decoder.decode(actions, np.arange(len(due)), due, columns.__getitem__)

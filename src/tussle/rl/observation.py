@@ -279,10 +279,6 @@ class _Search(_Others):
 
     def _check_of(self, mission: Mission, radius: float, needs_radius: bool) -> None:
         of, name = self.of, type(self).__name__
-        if isinstance(of, bool) or not (of is None or isinstance(of, str | int)):
-            raise ParameterError(
-                f"{name}: of = {of!r} is not allowed; it takes 'own', 'other', a team number, names of blocks, or None"
-            )
         if isinstance(of, str) and of not in TEAMS:
             known = [b.name for b in mission.blocks]
             for block in of.split() or [""]:

@@ -13,7 +13,7 @@ from tussle.numeric import rng
 from tussle.plugins.stock import Learned
 from tussle.rl.action import Actor, learned
 from tussle.rl.flight import MAX_POLICIES, registered_task, registered_tasks
-from tussle.rl.policy_file import write_policy
+from tussle.rl.policy_file import kept_file, write_policy
 from tussle.rl.swarm import task_of
 from tussle.rl.task import Task
 
@@ -103,7 +103,8 @@ class Pool:
             given = source or first
             if given.is_file():
                 if source or not file.exists():
-                    shutil.copyfile(given, file)
+                    with kept_file(file) as part:
+                        shutil.copyfile(given, part)
             elif not file.exists():
                 decoder, width = other.decoders[0], sum(other.widths[other.blocks[0].name])
                 n_out = len(decoder.free) if decoder.is_continuous else int(decoder.sizes.sum())
@@ -125,8 +126,7 @@ class Pool:
             place = int(rng.uniform(self._seed, PAST, 0, n)[0, 0] * n) if n > len(former) else n - 1
             due += former[place : place + 1]
         for file in due:
-            write_policy(file.with_suffix(".new"), layers, task=self._name)
-            file.with_suffix(".new").replace(file)
+            write_policy(file, layers, task=self._name)
 
 
 def _slots(entry: str) -> list[tuple[str, Path | None]]:

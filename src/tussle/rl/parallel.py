@@ -10,6 +10,7 @@ import numpy as np
 from pettingzoo import ParallelEnv
 
 from tussle.errors import ParameterError, nearest_name
+from tussle.rl.action import array_of
 from tussle.rl.environments import Pictures, check_options, in_parts, metadata_of, reset_one, told_of_one
 from tussle.rl.swarm import Swarm
 
@@ -142,6 +143,10 @@ class TaskParallelEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]  # Pett
 
     def _take(self, actions: Mapping[str, Any]) -> None:
         """Write the actions to one array."""
+        if not isinstance(actions, Mapping):
+            raise ParameterError(
+                f"actions = {actions!r:.80} is not allowed; it takes an action by the name of each agent"
+            )
         is_in_order = list(actions) == self.agents
         if not is_in_order and actions.keys() != set(self.agents):
             for name in actions:
@@ -175,7 +180,7 @@ class TaskParallelEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]  # Pett
     def _take_each(self, many: list[Any]) -> None:
         """Write actions that differ in shape or type, and say which is wrong."""
         for name, value in zip(self.agents, many, strict=True):
-            space, given = self.action_spaces[name], np.asarray(value)
+            space, given = self.action_spaces[name], array_of(f"the action of {name!r}", value)
             kinds = "f" if self.swarm.is_continuous else "iu"
             if given.shape != space.shape or given.dtype.kind not in kinds:
                 raise ParameterError(

@@ -2,20 +2,38 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from tussle.errors import MissingExtraError, ParameterError, listed
+from tussle.arguments import explained
+from tussle.errors import MissingExtraError, ParameterError, RecordError, listed
+from tussle.folders import whole_file
 
 TASK_KEY = "tussle.task"
 """Name of the task in the metadata of a policy's file."""
 ACTIVATIONS = ("Tanh", "Relu", "Sigmoid", "Elu")
 
 
+@contextmanager
+def kept_file(path: Path) -> Iterator[Path]:
+    """`whole_file` for what training and leagues keep.
+
+    Raises:
+        RecordError: The file cannot be written.
+    """
+    try:
+        with whole_file(path) as part:
+            yield part
+    except OSError as error:
+        raise RecordError(f"{path}: cannot be written: {error.strerror or error}") from error
+
+
+@explained
 def write_policy(
     path: str | Path, layers: Sequence[tuple[Any, Any]], *, task: str = "", activation: str = "Tanh"
 ) -> None:
@@ -30,6 +48,7 @@ def write_policy(
     Raises:
         MissingExtraError: The package onnx is not installed.
         ParameterError: The shapes do not fit together, or the activation is unknown.
+        RecordError: The file cannot be written.
     """
     try:
         from onnx import TensorProto, helper, numpy_helper, save_model
@@ -39,7 +58,10 @@ def write_policy(
         raise ParameterError(
             f"write_policy: activation = {activation!r} is not allowed; {listed(ACTIVATIONS)}"
         )
-    arrays = [(np.asarray(w, np.float32), np.asarray(b, np.float32)) for w, b in layers]
+    try:
+        arrays = [(np.asarray(w, np.float32), np.asarray(b, np.float32)) for w, b in layers]
+    except ValueError as error:
+        raise ParameterError(f"write_policy: layers are no arrays of numbers: {error}") from None
     shapes = [w.shape for w, _ in arrays]
     if (
         not arrays
@@ -66,7 +88,8 @@ def write_policy(
     graph = helper.make_graph(nodes, "policy", ends[:1], ends[1:], tensors)
     model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)], ir_version=8)
     helper.set_model_props(model, {TASK_KEY: task} if task else {})
-    save_model(model, str(path))
+    with kept_file(Path(path)) as part:
+        save_model(model, str(part), format="protobuf")
 
 
-__all__ = ["ACTIVATIONS", "TASK_KEY", "write_policy"]
+__all__ = ["ACTIVATIONS", "TASK_KEY", "kept_file", "write_policy"]

@@ -9,9 +9,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tussle.api.bodies import DERIVED, FLOATS
+from tussle.arguments import check_fields, explained
 from tussle.errors import ParameterError, listed, nearest_name
 from tussle.record.events import CAPTURE, COLLISION, DEATH, FLAG
 from tussle.rl import kernels
+from tussle.rl.action import array_of
 from tussle.rl.observation import TEAMS, AgentRows, Component, Means, NearestOthers, block_numbers
 
 if TYPE_CHECKING:
@@ -42,6 +44,7 @@ class FoundOthers:
     relative_vel: np.ndarray
 
 
+@explained
 class Situation:
     """The agents of all worlds after a decision, for rewards and ends; W worlds, A agents in each. Arrays are valid until the next step.
 
@@ -153,6 +156,7 @@ class Situation:
         """What a component, which is made once, observes of the present state, (W A, numbers); 0 for the dead."""
         if key not in self._components:
             component, mission = make(), self.simulation.mission
+            check_fields(component)
             width = max(component.width(mission, b.name) for b in mission.blocks)
             self._components[key] = component, width
         component, width = self._components[key]
@@ -269,15 +273,11 @@ class Term:
     per: str = "agent"
 
     def __post_init__(self) -> None:
+        check_fields(self)
         if self.per not in SHARES:
             raise ParameterError(f"Term: per = {self.per!r} is not allowed; {listed(SHARES)}")
-        if not callable(self.function):
-            raise ParameterError(
-                f"Term: function = {self.function!r} is not allowed; it takes a function of a Situation"
-            )
-        weight: Any = self.weight
-        if not (isinstance(weight, (int, float, np.number)) and np.isfinite(weight)):
-            raise ParameterError(f"Term: weight = {weight!r} is not allowed; it takes a finite number")
+        if not np.isfinite(self.weight):
+            raise ParameterError(f"Term: weight = {self.weight!r} is not allowed; it takes a finite number")
 
     def write(self, now: Situation, out: np.ndarray) -> None:
         """Write the weighted values to out, (W, A); 0 for agents that were dead before.
@@ -285,7 +285,7 @@ class Term:
         Raises:
             ParameterError: The values have another shape, or are not finite numbers.
         """
-        values = np.asarray(self.function(now))
+        values = array_of("returns a list", self.function(now))
         worlds, agents = out.shape
         if values.shape not in ((), (worlds, agents), (worlds, 1), (1, agents)):
             raise ParameterError(

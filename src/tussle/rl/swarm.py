@@ -10,9 +10,12 @@ from typing import Any, Self
 
 import numpy as np
 
+from tussle.arguments import explained
 from tussle.batch.variables import Choice, Range
+from tussle.documents import Whole, check_argument
 from tussle.engine.simulation import Simulation
 from tussle.errors import ParameterError, SnapshotError, WiringError, listed
+from tussle.rl.action import array_of
 from tussle.rl.episodes import Episodes, checked_params, checked_seeds, checked_value, checked_worlds
 from tussle.rl.observation import AgentRows, Each
 from tussle.rl.reward import COUNTED, NOBODY, Situation
@@ -34,6 +37,7 @@ def task_of(task: Any) -> Task:
     return made
 
 
+@explained
 class Swarm:
     """The agents of a task in W worlds, A in each, as arrays (W, A, ...), which the next `step` or `reset` overwrites.
 
@@ -69,8 +73,7 @@ class Swarm:
         self.task = task = task_of(task)
         if autoreset not in AUTORESET:
             raise ParameterError(f"autoreset = {autoreset!r} is not allowed; {listed(AUTORESET)}")
-        if isinstance(num_envs, bool) or int(num_envs) != num_envs or num_envs < 1:
-            raise ParameterError(f"num_envs = {num_envs!r} is not allowed; it takes a whole number >= 1")
+        check_argument("num_envs", num_envs, Whole(1))
         self.autoreset, self.n_worlds, self.n_agents = autoreset, int(num_envs), len(task.agent_names)
         worlds, shape, dtype = self.n_worlds, (self.n_worlds, self.n_agents), task.dtype
         width = max(sum(widths) for widths in task.widths.values())
@@ -327,8 +330,9 @@ class Swarm:
             self._states[0] = self._of_worlds()
         if self.masks is None:
             return
-        given = np.asarray(self.task.action_mask(self.now))
-        where, shape = f"{type(self.task).__name__}.action_mask", self.masks.shape
+        where = f"{type(self.task).__name__}.action_mask"
+        given = array_of(where, self.task.action_mask(self.now))
+        shape = self.masks.shape
         try:
             self.masks[:] = np.broadcast_to(given, shape)
         except ValueError:
@@ -375,7 +379,7 @@ class Swarm:
         self.over[worlds] = self.late[worlds] = False
 
     def _act(self, actions: Any) -> None:
-        given = np.asarray(actions)
+        given = array_of("actions", actions)
         shape = (self.n_worlds, self.n_agents, self.action_width)
         if given.shape == shape[:2] and self.action_width == 1:
             given = given[..., None]
@@ -419,7 +423,7 @@ class Swarm:
         np.copyto(self.terminations, now.died)
         over = self._are_decided() if self._check_ends else np.zeros(self.n_worlds, bool)
         if not self._never_ends:
-            ends = np.asarray(task.ends(now))
+            ends = array_of(f"{type(task).__name__}.ends", task.ends(now))
             if ends.shape not in ((), over.shape) or ends.dtype != bool:
                 raise ParameterError(
                     f"{type(task).__name__}.ends returns {ends.dtype} of shape {ends.shape}; "
@@ -473,7 +477,8 @@ class Swarm:
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """Return to a state of this swarm, or of another one with the same task and number of worlds."""
-        self.simulation.restore(state["simulation"])
+        saved: Any = state.get("simulation")
+        self.simulation.restore(saved)
         self.episodes.restore(state["episodes"])
         self._ints = self._told = None
         self._look()
@@ -513,6 +518,7 @@ def make_swarm(task: Any, num_envs: int = 1, *, autoreset: str = "same_step", th
     return Swarm(task, num_envs, autoreset=autoreset, threads=threads)
 
 
+@explained
 def record_episode(
     task: Any, policy: Callable[[np.ndarray], Any], directory: str | Path, *, seed: int = 1
 ) -> dict[str, float]:
@@ -543,6 +549,7 @@ def record_episode(
     return sums
 
 
+@explained
 def evaluate(
     task: Any, policy: Callable[[np.ndarray], Any] | None = None, n_episodes: int = 100, *, seed: int = 1, threads: int = 1
 ) -> dict[str, np.ndarray]:  # fmt: skip
@@ -562,6 +569,7 @@ def evaluate(
         ParameterError: No autonomies play the agents' blocks.
     """
     task = task_of(task)
+    check_argument("n_episodes", n_episodes, Whole(1))
     if policy is None:
         task = task.by_rule()
         idle = np.zeros((n_episodes, len(task.agent_names), 0), task.dtype)

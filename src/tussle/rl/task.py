@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Mapping, Sequence
+from dataclasses import is_dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any, ClassVar
@@ -11,6 +12,7 @@ from typing import Any, ClassVar
 import numpy as np
 from gymnasium import spaces
 
+from tussle.arguments import check_fields, check_kind, kinds_of
 from tussle.documents import Whole, check_argument
 from tussle.errors import ParameterError, listed, nearest_name
 from tussle.mission import Block, Mission, mission_of
@@ -22,14 +24,6 @@ from tussle.rl.reward import Situation, Term
 
 TIMELESS = 1e9
 """End of the mission that is simulated [s]; episodes are ended by the task."""
-KINDS = (
-    ("learners", str, "names of blocks, as 'prey' or 'keepers switchers'"),
-    ("reward", Mapping, "terms by name"),
-    ("policies", Mapping, "names of policies by block"),
-    ("room", Mapping, "numbers of agents by block"),
-    ("overrides", Mapping, "values by path"),
-)
-"""Attributes of a task with their types, and what to call these."""
 
 
 class Task:
@@ -118,21 +112,16 @@ class Task:
 
     def _check(self) -> None:
         where = type(self).__name__
-        for name, kind, allowed in KINDS:
-            value = getattr(self, name)
-            if not isinstance(value, kind):
-                raise ParameterError(f"{where}: {name} = {value!r:.80} is not allowed; it takes {allowed}")
+        for name, kind in kinds_of(Task).items():
+            check_kind(f"{where}: {name}", getattr(self, name), kind)
         check_argument(f"{where}: decide_every", self.decide_every, Whole(1))
-        limit: Any = self.time_limit
-        if limit is not None and not (isinstance(limit, (int, float, np.number)) and limit > 0.0):
+        if self.time_limit is not None and not self.time_limit > 0.0:
             raise ParameterError(
                 f"{where}: time_limit = {self.time_limit!r} is not allowed; it takes a number of seconds > 0"
             )
-        if np.dtype(self.dtype) not in (np.float32, np.float64):
+        if self.dtype is None or self.dtype not in (np.dtype(np.float32), np.dtype(np.float64)):
             raise ParameterError(f"{where}: dtype = {self.dtype!r} is not allowed; it is float32 or float64")
-        for name, term in self.reward.items():
-            if not isinstance(term, Term):
-                raise ParameterError(f"{where}: reward {name!r} is {term!r}, not a Term")
+        for name in self.reward:
             if name.startswith("_"):  # "_NAME" is the mask of NAME in the infos of vector environments
                 raise ParameterError(f"{where}: reward {name!r}: the name of a term does not begin with _")
         _ = self.widths
@@ -144,9 +133,11 @@ class Task:
                         f"{where}: {attribute}: there is no block {name!r}{nearest_name(str(name), known)}; {listed(known)}"
                     )
                 check_argument(f"{where}: {attribute} of {name!r}", value, rule)
+        if not self.agent_names:
+            raise ParameterError(
+                f"{where}: {self.learners!r} has no agents; give the blocks a count, or room"
+            )
         if self.state is not None:
-            if not isinstance(self.state, Computed):
-                raise ParameterError(f"{where}: state is {self.state!r:.80}, not a Computed")
             self.state.check()
         if self.has_mask and any(d.is_continuous for d in self.decoders):
             raise ParameterError(f"{where}: action_mask needs actions with levels")
@@ -210,6 +201,8 @@ class Task:
         for item in [item for items in found.values() for item in items]:
             if not isinstance(item, kind):
                 raise ParameterError(f"{where}: {what}: {item!r} is no {kind.__name__}")
+            if is_dataclass(item):
+                check_fields(item)
         if kind is Component and not all([found, *found.values()]):
             raise ParameterError(f"{where}: {what} of {block!r} is empty")
         return found.get("", found)

@@ -16,10 +16,10 @@ from typing import Any
 
 import numpy as np
 
-from tussle.errors import MissingExtraError, ParameterError, listed
+from tussle.errors import MissingExtraError, ParameterError, RecordError, listed
 from tussle.notebook_bar import Show, notebook_bar
 from tussle.rl.actor_critic import ActorCritic
-from tussle.rl.policy_file import write_policy
+from tussle.rl.policy_file import kept_file, write_policy
 from tussle.rl.settings import Settings
 from tussle.rl.swarm import Swarm
 from tussle.rl.task import Task
@@ -57,6 +57,18 @@ class Decisions:
             self.obs[some]
             if self.states is None
             else torch.cat([self.obs[some], self.states[self.place[some]]], -1)
+        )
+
+
+def check_finite(what: str, values: Any) -> None:
+    """Refuse what would make all weights NaN.
+
+    Raises:
+        ParameterError: A number is not finite.
+    """
+    if not torch.isfinite(values).all():
+        raise ParameterError(
+            f"{what} is not a finite number of single precision; scale observations and rewards to about 1, or lower learning_rate"
         )
 
 
@@ -119,6 +131,7 @@ class Rollout:
         """Draw actions, (W, agents, n)."""
         role, swarm, model = self.role, self.swarm, self.role.model
         self.obs[t], self.alive[t], mask = role.obs(swarm.obs), role.of(swarm.alive).float(), None
+        check_finite("an observation", self.obs[t])
         if self.mask is not None:
             mask = self.mask[t] = role.mask(swarm)
         if self.states is not None:
@@ -277,9 +290,10 @@ class Trainer:
                 entropy = sum(d.entropy().mean() for d in distributions)
                 loss = -torch.minimum(gain * ratio, gain * clipped).mean() - s.entropy * entropy
                 loss = loss + 0.5 * (value - batch.returns[some]).square().mean()
+                check_finite("the loss", loss)
                 role.optimizer.zero_grad()
                 loss.backward()
-                nn.utils.clip_grad_norm_(model.parameters, 0.5)
+                check_finite("the gradient of the loss", nn.utils.clip_grad_norm_(model.parameters, 0.5))
                 role.optimizer.step()
 
     def train(self, minutes: float, tell: Callable[[dict[str, float]], bool]) -> None:
@@ -289,7 +303,15 @@ class Trainer:
             minutes: Wall time without evaluations [min].
             tell: Called after each update with the new line of the curve, by its columns, and after an evaluation with "low" and "high",
                 the ends of the 95 % interval of "evaluated", the mean return; ends the training where it returns true.
+
+        Raises:
+            ParameterError: Observations, the loss or its gradient are not finite; files keep what was saved before.
+            RecordError: The folder cannot be written.
         """
+        try:
+            self.folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise RecordError(f"{self.folder}: cannot be written: {error.strerror or error}") from error
         with notebook_bar("training") as show:
             self._train(minutes, tell, show)
 
@@ -335,17 +357,19 @@ class Trainer:
 
     def save(self) -> None:
         """Write checkpoint.pt, curve.csv, evaluations.csv and the policies."""
-        self.folder.mkdir(parents=True, exist_ok=True)
         roles = {name: [role.model.state(), role.optimizer.state_dict()] for name, role in self.roles.items()}
         state = {"roles": roles, "settings": asdict(self.settings), "task": self.name,
                  "counts": [self.minutes, self.n_decisions, self.n_episodes], "curve": self.curve,
                  "evaluations": self.evaluations, "random": torch.get_rng_state()}  # fmt: skip
-        torch.save(state, self.folder / "checkpoint.new")
-        (self.folder / "checkpoint.new").replace(self.folder / "checkpoint.pt")
+        with kept_file(self.folder / "checkpoint.pt") as part:
+            torch.save(state, part)
         tables = {"curve": (CURVE, self.curve), "evaluations": (EVALUATIONS, self.evaluations)}
         for table, (columns, lines) in tables.items():
             if lines:
-                with (self.folder / f"{table}.csv").open("w", newline="", encoding="utf-8") as file:
+                with (
+                    kept_file(self.folder / f"{table}.csv") as part,
+                    part.open("w", newline="", encoding="utf-8") as file,
+                ):
                     csv.writer(file).writerows([columns, *lines])
         for name, path in self.files.items():
             write_policy(path, self.roles[name].model.layers(), task=self.name)
@@ -359,9 +383,14 @@ class Trainer:
         path = self.folder / "checkpoint.pt"
         try:
             state = torch.load(path, weights_only=True)
+            known = state["task"], state["settings"]
         except FileNotFoundError:
             raise ParameterError(f"{path} does not exist; train without --resume first") from None
-        if (state["task"], state["settings"]) != (self.name, asdict(self.settings)):
+        except Exception:  # noqa: BLE001 - of zip files, pickles and PyTorch
+            raise ParameterError(
+                f"{path} is damaged or no checkpoint; remove it, and train without --resume"
+            ) from None
+        if known != (self.name, asdict(self.settings)):
             raise ParameterError(
                 f"{path} is of {state['task']} with {state['settings']}; resume with the same task and settings"
             )

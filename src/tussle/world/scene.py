@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from tussle.arguments import Array, explained
 from tussle.errors import MissionError, ParameterError, listed, nearest_name
 from tussle.world.geodesy import Origin
 from tussle.world.prism import Prism
@@ -112,6 +113,7 @@ def find_region(regions: Iterable[TeamRegion], boundary: float) -> TeamRegion:
     )
 
 
+@explained
 @dataclass(frozen=True)
 class Scene:
     """Everything in a mission that does not move.
@@ -212,7 +214,7 @@ class Scene:
 
         return StaticSolids(self.walls)
 
-    def cast(self, origins: Any, directions: Any, max_range: Any = np.inf) -> Hits:
+    def cast(self, origins: Array, directions: Array, max_range: Array = np.inf) -> Hits:
         """The first hits of rays on the scene; `g.cast` also finds entities.
 
         A ray meets a surface from either side, also one on which it begins.
@@ -227,7 +229,7 @@ class Scene:
         """
         return self.caster.cast(origins, directions, max_range)
 
-    def height(self, x: Any, y: Any) -> np.ndarray:
+    def height(self, x: Array, y: Array) -> np.ndarray:
         """Height of the highest surface at places x, y [m], (n,): roofs, meshes, terrain and ground.
 
         -inf where there is none, and at places that are not finite.
@@ -244,7 +246,7 @@ class Scene:
         surface = (top - self.cast(start, down).distance).reshape(east.shape)
         return np.asarray(np.where(is_place, surface, -np.inf))
 
-    def free(self, points: Any, radius: Any) -> np.ndarray:
+    def free(self, points: Array, radius: Array) -> np.ndarray:
         """Return True if spheres round points [m], (3, n), with a radius [m], one or (n,), neither touch nor lie inside a solid, (n,).
 
         A mesh is a surface: a point that it surrounds is free.
@@ -254,7 +256,7 @@ class Scene:
         """
         return ~self.caster.touches(points, radius)
 
-    def free_between(self, a: Any, b: Any, radius: Any) -> np.ndarray:
+    def free_between(self, a: Array, b: Array, radius: Array) -> np.ndarray:
         """Return True if spheres that move straight from points a to b [m], (3, n) each, stay `free` all the way, (n,).
 
         A touch less deep than 0.1 mm, or than 0.5 % of the radius [m], one or (n,), may not be found.
@@ -267,7 +269,7 @@ class Scene:
             raise ParameterError(f"a has shape {start.shape} and b {end.shape}; they must be equal")
         return ~self.caster.touches_between(start, end, radius)
 
-    def line_of_sight(self, a: Any, b: Any) -> np.ndarray:
+    def line_of_sight(self, a: Array, b: Array) -> np.ndarray:
         """Return True if nothing of the scene lies between points a and b [m], (3, n) each; (n,).
 
         Raises:

@@ -1,15 +1,33 @@
 """Declarations and arguments of views that cannot be are refused by name; none is taken for something else."""
 
+import inspect
 import math
+import re
+from contextlib import suppress
+from functools import partial
 
 import numpy as np
 import pytest
 from small_worlds import block, mission
 
-from tussle import Simulation
-from tussle.api import Autonomy, Input, Interaction, Metric, Param, Publish, State, Subscribe, neighbors
-from tussle.errors import DeclarationError, PluginError
-from tussle.stock import Still
+from tussle import Simulation, load_run
+from tussle.api import (
+    Autonomy,
+    EasyAutonomy,
+    EasyInteraction,
+    Input,
+    Interaction,
+    Metric,
+    Output,
+    Param,
+    Publish,
+    State,
+    Subscribe,
+    neighbors,
+)  # fmt: skip
+from tussle.errors import DeclarationError, ParameterError, PluginError, TussleError
+from tussle.plan import Problem, solve
+from tussle.stock import Still, Unicycle
 
 
 @pytest.mark.parametrize(
@@ -26,6 +44,11 @@ from tussle.stock import Still
         (lambda: State(dtype=bool, default=2), "default = 2 is not allowed; it takes true or false"),
         (lambda: State("x y", dtype=int, default=(1, 0.5)), r"it takes a whole number of 64 bits, or 2 \(x, y\)"),
         (lambda: Input("u v", optional=True, default=(1, 2, 3)), r"Input: default = \(1, 2, 3\) is not allowed"),
+        (lambda: State(unit=5), "State: unit = 5 is not allowed; it takes a text"),
+        (lambda: Output(dtype=int), r"Output: got an unexpected keyword argument 'dtype'.*; there are: channels, unit, ragged"),
+        (lambda: Input(chanels="a"), r"Input: .*'chanels' \(did you mean 'channels'\?\)"),
+        (Param, "Param: missing a required argument: 'default'"),
+        (lambda: Param(1, choices=5), "Param: choices = 5 is not allowed; it takes a list"),
         (lambda: State("a b", per="team"), "fields='a b' with per='team', which has one number per team"),
         (lambda: State(5), "State: names = 5 is not allowed; it takes a text"),
         (lambda: Publish(3), "Publish: 3 is not a class of messages"),
@@ -99,6 +122,10 @@ def looks(look):
             (lambda w, k=k: w.nearest(k), "nearest: k = .* is not allowed; it takes a whole number >= 1")
             for k in (0, -1, 1.5, "2", True)
         ),
+        (lambda w: w.uniform(5), "uniform: label = 5 is not allowed; it takes a text"),
+        (lambda w: w.uniform(), "uniform: missing a required argument: 'label'; there are: label, k"),
+        (lambda w: w.region("a"), "region: boundary = 'a' is not allowed; it takes a number"),
+        (lambda w: w.who(5), "who: row = 5 is not allowed; it takes a whole number from 0 to 4"),
         (lambda w: w.nearest(teams=np.ones(3)), r"nearest: teams = an array \(3,\) is not allowed; it takes \(5,\)"),
         *(
             (lambda w, ids=ids: w.rows_of(ids), r"ids = an array of .* is not allowed; it takes whole numbers, \(5,\)")
@@ -136,3 +163,68 @@ def test_the_default_of_an_input_has_a_number_for_each_channel():
     with Simulation(mission(block("a", team=1, autonomy=Reads(), motion=Still()))) as simulation:
         simulation.step()
         assert simulation.read("a.Reads.seen")[0].ravel().tolist() == [3.0, 4.0, 5.0]
+
+
+def wrong_calls(view):
+    """Call each method of a view with objects for the arguments that it needs, and for each other one. Yields the name and the call."""
+    for name, method in inspect.getmembers(type(view), inspect.isfunction):
+        given = [p for p in inspect.signature(method).parameters.values() if p.name != "self"]
+        given = [p for p in given if p.kind not in (p.VAR_POSITIONAL, p.VAR_KEYWORD)]
+        for which in (
+            given if not name.startswith("_") and name not in ("begin", "step") else ()
+        ):  # of the engine
+            chosen = [p for p in given if p is which or p.default is p.empty]
+            args = [object() for p in chosen if p.kind is p.POSITIONAL_ONLY]
+            kwargs = {p.name: object() for p in chosen if p.kind is not p.POSITIONAL_ONLY}
+            yield f"{name}: {which.name}", partial(getattr(view, name), *args, **kwargs)
+
+
+def check_wrong_calls(self, view):
+    for name, call in wrong_calls(view):
+        try:
+            call()
+        except TussleError:
+            continue
+        raise AssertionError(f"{type(view).__name__}.{name} takes any object")
+
+
+@pytest.mark.parametrize("base", [Autonomy, EasyAutonomy, Interaction, EasyInteraction])
+def test_an_argument_of_another_type_is_never_an_error_of_python(base):
+    own = type(
+        "Own", (base,), {"step_one" if base in (EasyAutonomy, EasyInteraction) else "step": check_wrong_calls}
+    )()
+    is_autonomy = issubclass(base, Autonomy)
+    plugins = {"interactions": [] if is_autonomy else [own]}
+    with Simulation(
+        mission(block("a", team=1, count=2, autonomy=own if is_autonomy else (), motion=Still()), **plugins)
+    ) as simulation:
+        simulation.step()
+        scene = simulation.mission.scene
+    for _, call in wrong_calls(scene):
+        with suppress(TussleError):  # `bases_of` takes any
+            call()
+
+
+def test_a_function_names_the_argument_of_another_type():
+    made = Simulation(mission(block("a")))
+    gap = {"motion": Unicycle(), "start": {}, "goal": (9.0, 0, 0), "goal_radius": 1.0, "bounds": {"x": (0, 9), "y": (0, 9)},
+           "commands": {"speed": (0, 1)}}  # fmt: skip
+    calls = {
+        "path = 5 is not allowed; it takes a text or a Path": lambda: load_run(5),
+        "call = 3 is not allowed; it takes a function": lambda: made.schedule.insert(before="motion", call=3),
+        "before = 3 is not allowed; it takes a text or None": lambda: made.schedule.insert(
+            before=3, call=print
+        ),
+        "problem = None is not allowed; it takes a Problem": lambda: solve(None),
+        "cells = [1] is not allowed; it takes values by name or None": lambda: solve(
+            Problem(**gap), cells=[1]
+        ),
+        "motion = None is not allowed; it takes a MotionModel": lambda: Problem(**{**gap, "motion": None}),
+        "start = [1] is not allowed; it takes values by name": lambda: Problem(**{**gap, "start": [1]}),
+        "bounds = [1] is not allowed; it takes values by name": lambda: Problem(**{**gap, "bounds": [1]}),
+        "scene = None is not allowed; it takes a Scene": lambda: Problem(**{**gap, "scene": None}),
+    }
+    for text, call in calls.items():
+        with pytest.raises(ParameterError, match=re.escape(text)):
+            call()
+    made.close()

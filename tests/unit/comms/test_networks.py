@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import tracemalloc
 
 import numpy as np
@@ -20,9 +21,9 @@ from small_worlds import (
 )
 
 from tussle import Simulation
-from tussle.api import Autonomy, Interaction, Network, Param, Publish, State, Subscribe, service
+from tussle.api import Autonomy, Interaction, Links, Network, Param, Publish, State, Subscribe, service
 from tussle.errors import MissionError, ParameterError, PluginError, TussleError, WiringError
-from tussle.stock import GlobalNetwork, LocalNetwork, SphereNetwork
+from tussle.stock import FailingRadio, GlobalNetwork, LocalNetwork, RadioNetwork, SphereNetwork
 
 
 def still(name, *autonomies, **values):
@@ -485,3 +486,71 @@ def test_two_networks_of_one_name_are_refused():
 def test_prob_transmit_is_a_probability():
     with pytest.raises(ParameterError, match=r"SphereNetwork.prob_transmit = 1.5 is not allowed"):
         SphereNetwork(prob_transmit=1.5)
+
+
+class Own(Network):
+    """A network of one's own, which `changes` its links."""
+
+    changes = staticmethod(lambda links: links)
+
+    def transmit(self, w, outboxes):
+        return self.changes(Links(w, outboxes, np.inf))
+
+
+def with_network(network, **values):
+    name = type(network).__name__
+    return mission(
+        still(
+            "a",
+            Talker(network=name),
+            Listener(network=name),
+            count=3,
+            placement="uniform",
+            half_width=(20.0, 20.0, 20.0),
+        ),
+        still("b", Listener(network=name), position=(30.0, 0.0, 0.0)),
+        networks=[network],
+        **values,
+    )
+
+
+@pytest.mark.parametrize(
+    ("change", "losses", "text"),
+    [
+        (lambda links: None, (), "transmit returned None; it must return Links, or a list"),
+        (lambda links: links.lose(0, links.distance > 1), (), "reason number 0; in losses there are none"),
+        (lambda links: links.lose(2, links.distance > 1), ("far",), r"reason number 2; in losses there are: 0 \(far\)"),
+        (lambda links: links.lose(0, [True]), ("far",), r"lose: where is bool of shape \(1,\); it takes truth values, \(\d+,\)"),
+        (lambda links: links.keep(links.distance), (), "keep: where is float64 of shape .*; it takes truth values"),
+        (lambda links: setattr(links, "delay", 0.1), (), r"delay = 0.1; it takes numbers \[s\], \(\d+,\), one per link"),
+        (lambda links: setattr(links, "delay", links.distance * np.nan), (), "delay = array.*; it takes numbers"),
+        (lambda links: setattr(links, "delay", ["x"] * len(links.distance)), (), "delay = .*; it takes numbers"),
+    ],
+)  # fmt: skip
+def test_what_a_network_returns_is_checked(change, losses, text):
+    def changes(self, links):
+        return None if change(links) is None and text.startswith("transmit returned None") else links
+
+    own = type("Own", (Own,), {"changes": changes, "losses": losses})()
+    with Simulation(with_network(own)) as simulation, pytest.raises(PluginError, match=text):
+        simulation.step(3)
+
+
+def test_a_network_without_losses_needs_no_counts():
+    with Simulation(with_network(Own())) as simulation:
+        simulation.run()
+        assert heard(simulation, "b.Listener").tolist() == [[27]]
+
+
+@pytest.mark.parametrize("network", [SphereNetwork, RadioNetwork, FailingRadio])
+def test_no_bound_of_a_parameter_makes_a_network_compute_nonsense(network):
+    """Warnings of NumPy, as of inf - inf, are errors."""
+    for name, column in network.params().items():
+        if column.dtype is not float or column.is_text:
+            continue
+        for bound in {column.ge, column.le, column.gt and 2 * column.gt, 1e-30, 1e30, math.inf, -math.inf} - {
+            None
+        }:
+            if column.is_within(bound):
+                with Simulation(with_network(network(**{name: bound}), end=0.3)) as simulation:
+                    simulation.run()

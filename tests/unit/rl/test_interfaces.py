@@ -13,8 +13,22 @@ from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AutoresetMode
 from pettingzoo.utils import parallel_to_aec
 
-from tussle.errors import ParameterError
-from tussle.rl import TaskParallelEnv, Term, alive, make, make_vec, parallel_env
+from tussle.errors import ParameterError, TussleError
+from tussle.rl import (
+    Act,
+    Computed,
+    Own,
+    Sectors,
+    TaskParallelEnv,
+    Term,
+    alive,
+    evaluate,
+    make,
+    make_vec,
+    parallel_env,
+    register,
+    write_policy,
+)  # fmt: skip
 
 
 @pytest.mark.parametrize("which", ["task", "solo"])
@@ -91,6 +105,55 @@ def test_actions_that_do_not_fit_are_refused(task):
     ]:
         with pytest.raises(ParameterError, match=message):
             vec.step(actions)
+
+
+RAGGED = [[1.0, 2.0], [3.0]]
+
+
+@pytest.mark.parametrize(
+    ("call", "text"),
+    [
+        (lambda task: make(task).step(RAGGED), "the action: no array can be made of it"),
+        (lambda task: make_vec(task, 2).step(RAGGED), "actions: no array can be made of it"),
+        (lambda task: begun(task).step(None), "actions = None is not allowed; it takes an action by the name"),
+        (lambda task: begun(task).step(dict.fromkeys(begun(task).agents, RAGGED)), "the action of 'prey_0': no array"),
+        (lambda task: make(task).reset(options=["params"]), r"options = \['params'\] is not allowed; it takes values by name"),
+        (lambda task: begun(task).swarm.restore(5), "restore: state = 5 is not allowed; it takes values by name"),
+        (lambda task: begun(task).swarm.restore({}), "restore takes what `snapshot` returned"),
+        (lambda task: begun(task).swarm.now.nearest(of=["prey"]), r"nearest: of = \['prey'\] is not allowed"),
+        (lambda task: begun(task).swarm.now.n_living(["prey"]), r"n_living: of = \['prey'\] is not allowed"),
+        (lambda task: make_vec(task, np.nan), "num_envs = nan is not allowed; it takes a whole number >= 1"),
+        (lambda task: evaluate(task, 5), "policy = 5 is not allowed; it takes a function or None"),
+        (lambda task: evaluate(task, None, "x"), "n_episodes = 'x' is not allowed; it takes a whole number >= 1"),
+        (lambda task: register("mine/Five-v0", 5), "5 is not a Task"),
+        (lambda task: register(5, task), "name = 5 is not allowed; it takes a text"),
+        (lambda task: write_policy(5, [([[1.0]], [0.0])]), "path = 5 is not allowed; it takes a text or a Path"),
+        (lambda task: write_policy("x", [("a", "b")]), "layers are no arrays of numbers"),
+        (lambda task: task.replace(dtype="x"), "dtype = 'x' is not allowed; it is float32 or float64"),
+        (lambda task: task.replace(dtype=None), "dtype = None is not allowed"),
+        (lambda task: task.replace(vary="a=1:2"), "vary = 'a=1:2' is not allowed; it takes a list, each a text or values by name"),
+        (lambda task: task.replace(vary=5), "vary = 5 is not allowed"),
+        (lambda task: task.replace(margin=5), "margin = 5 is not allowed; it takes a text"),
+        (lambda task: task.replace(is_symmetric="x"), "is_symmetric = 'x' is not allowed; it takes true or false"),
+        (lambda task: task.replace(room={"prey": 0}), "'prey' has no agents; give the blocks a count, or room"),
+        (lambda task: task.replace(observation=Own("pos", origin=3)), "Own: origin = 3 is not allowed; it takes 3 values"),
+        (lambda task: task.replace(observation=Own(5)), "Own: columns = 5 is not allowed; it takes a text"),
+        (lambda task: task.replace(observation=Own("pos", scale="x")), "Own: scale = 'x' is not allowed; it takes a number"),
+        (lambda task: task.replace(observation=Sectors(4, None)), "Sectors: radius = None is not allowed; it takes a number"),
+        (lambda task: task.replace(observation=Computed(0, len)), "Computed: n = 0 is not allowed; it takes a whole number >= 1"),
+        (lambda task: task.replace(action=Act("speed turn_rate", levels=RAGGED)), "levels: no array can be made of it"),
+        (lambda task: task.replace(action=Act("speed", levels=5)), "Act: levels = 5 is not allowed; it takes a list"),
+    ],
+)  # fmt: skip
+def test_what_is_of_another_type_is_refused_by_name(call, text, task):
+    with pytest.raises(TussleError, match=text):
+        call(task)
+
+
+def begun(task):
+    env = parallel_env(task)
+    env.reset(seed=1)
+    return env
 
 
 def test_supersuit_makes_a_vector_environment(task):

@@ -189,7 +189,7 @@ def test_masks_that_cannot_be_are_refused(mask, message):
 def test_declarations_that_cannot_be_are_refused():
     with pytest.raises(ParameterError, match="action_mask needs actions with levels"):
         type("Wrong", (Flee,), {"action_mask": lambda self, now: True})()
-    with pytest.raises(ParameterError, match="state is 3, not a Computed"):
+    with pytest.raises(ParameterError, match="state = 3 is not allowed; it takes a Computed or None"):
         Flee(state=3)
     with pytest.raises(ParameterError, match=r"policies: there is no block 'preys'.*prey"):
         Flee(policies={"preys": "a"})

@@ -11,8 +11,8 @@ from flee import Flee
 from needs import NEEDS
 
 from tussle import Simulation
-from tussle.errors import ParameterError
-from tussle.rl import Computed, Dispersal, NearOrigin, Own, PredatorsAndPrey, register
+from tussle.errors import ParameterError, RecordError
+from tussle.rl import Computed, Dispersal, NearOrigin, Own, PredatorsAndPrey, Term, alive, register
 from tussle.rl.settings import Settings, read_training
 from tussle.stock import Learned
 
@@ -178,6 +178,39 @@ def test_evaluations_have_intervals_and_do_not_change_the_training(trainer_of, t
     plain.settings = Settings(worlds=2, decisions=8)
     plain.train(10.0, lambda line: n.append(line) or len(n) == 6)
     np.testing.assert_allclose(plain.model.layers()[0][0], weights, atol=1e-4)
+
+
+@pytest.mark.parametrize("content", [b"", b"hello", b"PK\x03\x04"])
+def test_a_damaged_checkpoint_is_refused(content, trainer_of, tmp_path):
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "checkpoint.pt").write_bytes(content)
+    with pytest.raises(
+        ParameterError, match=r"checkpoint.pt is damaged or no checkpoint; remove it, and train"
+    ):
+        trainer_of(NearOrigin()).resume()
+
+
+@pytest.mark.parametrize(
+    ("values", "what"),
+    [
+        ({"observation": Own("pos", scale=1e-45)}, "an observation"),
+        ({"reward": {"huge": Term(alive, 1e30)}}, "the loss"),
+    ],
+)
+def test_numbers_that_are_not_finite_are_not_learned(values, what, trainer_of, tmp_path):
+    trainer = trainer_of(Flee(**values))
+    with pytest.raises(
+        ParameterError, match=f"^{what} is not a finite number of single precision; scale obs"
+    ):
+        trainer.train(1e-9, lambda line: False)
+    assert not list((tmp_path / "out").iterdir())
+    assert all(torch.isfinite(each).all() for each in trainer.model.parameters)
+
+
+def test_a_folder_that_cannot_be_written_is_told_before_the_training(trainer_of, tmp_path):
+    (tmp_path / "out").write_text("")
+    with pytest.raises(RecordError, match="out: cannot be written: File exists"):
+        trainer_of(NearOrigin()).train(1e-9, lambda line: pytest.fail("it has been trained"))
 
 
 def test_training_goes_on_from_a_checkpoint_of_all_roles(trainer_of):

@@ -276,6 +276,37 @@ def test_weights_that_do_not_fit_are_refused(tmp_path):
         write_policy(tmp_path / "p.onnx", [(np.ones((1, 2)), np.ones(1))], activation="tanh")
 
 
+@pytest.mark.parametrize(
+    ("node", "inputs"), [("ReduceMean", ["a"]), ("CumSum", ["a", "axis"]), ("RandomNormalLike", ["a"])]
+)
+def test_a_row_that_depends_on_others_or_on_chance_is_refused(node, inputs, tmp_path):
+    asks = {"axes": [0], "keepdims": 1} if node == "ReduceMean" else {}
+    nodes = [helper.make_node(node, inputs, ["m"], **asks), helper.make_node("Add", ["a", "m"], ["b"])]
+    save(
+        tmp_path / "x.onnx",
+        nodes,
+        [end("a", "n", 2)],
+        [end("b", "n", 2)],
+        [numpy_helper.from_array(np.array(0), "axis")],
+    )
+    with pytest.raises(ParameterError, match=r"x.onnx': outputs of a row depend on other rows or on chance"):
+        Policy(str(tmp_path / "x.onnx"))
+
+
+@pytest.mark.parametrize("bias", [[np.nan, 0.0], [0.0, np.nan], [-np.inf, -np.inf]])
+def test_levels_that_are_no_numbers_end_their_world(bias, tmp_path):
+    write_policy(tmp_path / "p.onnx", [(np.zeros((2, 2)), bias)], task="tussle/RLSimple-v0")
+    mission = NearOrigin().given
+    mission = mission.replace(
+        blocks=[mission.blocks[0].replace(autonomy=Learned(policy=str(tmp_path / "p.onnx")))]
+    )
+    with (
+        Simulation(mission) as simulation,
+        pytest.raises(PluginError, match=r"p.onnx returned a value that is not a number"),
+    ):
+        simulation.step(1)
+
+
 def test_an_output_that_is_no_number_ends_its_world(tmp_path):
     write_policy(tmp_path / "p.onnx", [(np.zeros((2, WIDTH)), [np.nan, 0.0])], task="tussle/PredatorTeam-v0")
     mission = with_policy(PredatorTeam().given, "switchers", policy=str(tmp_path / "p.onnx"))

@@ -18,6 +18,7 @@ from tussle.api.easy.values import (
     with_ids,
     write_number,
 )
+from tussle.arguments import explained
 from tussle.declare.columns import Publish
 from tussle.errors import ParameterError, listed, nearest_name
 from tussle.world.scene import Scene
@@ -39,6 +40,7 @@ def _of_body(name: str, doc: str) -> property:
     return property(lambda of: of._body[name][of._row], _read_only, doc=doc)
 
 
+@explained
 class Entity:
     """Body of an entity as plain values; abstract."""
 
@@ -118,6 +120,7 @@ def squared_distance(a: Entity, b: Entity) -> float:
     return x * x + y * y + z * z  # type: ignore[no-any-return]
 
 
+@explained
 class Other(Entity):
     """Another entity: its true state, and its position relative to the observing entity."""
 
@@ -144,6 +147,7 @@ class Other(Entity):
         return f"<entity {self._id} of team {self._body['team'][self._row]}>"
 
 
+@explained
 class Observer(Entity):
     """An entity with neighbour queries; abstract."""
 
@@ -185,6 +189,7 @@ class Observer(Entity):
         return [self._other(entity, row) for entity, row in found]
 
 
+@explained
 class Me(Observer):
     """One entity in easy mode: the columns of its plugin by name, its body as the entity believes it to be, and neighbour queries.
 

@@ -21,6 +21,7 @@ from tussle.api.easy.search import Search
 from tussle.api.easy.shared import RandomNumbers, WorldDraw
 from tussle.api.easy.values import BODY, Cells, Columns, ReceivedMessage, Write, make_type, with_ids
 from tussle.api.world import WorldView
+from tussle.arguments import explained
 from tussle.declare.columns import Column, State
 from tussle.declare.messages import Message
 from tussle.errors import ParameterError, listed, nearest_name
@@ -55,6 +56,7 @@ class WorldShared:
         return one
 
 
+@explained
 class Member(Observer, Other):
     """An entity in a world plugin: its body, the plugin's per-entity columns and neighbour queries.
 
@@ -103,6 +105,7 @@ class Member(Observer, Other):
         return type(self)(self._shared, entity, row, self)
 
 
+@explained
 class OneWorld:
     """One world in easy mode: its entities, the plugin's columns by name, and methods that change the world.
 

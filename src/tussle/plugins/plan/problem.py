@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from tussle.api import MotionModel
+from tussle.arguments import check_kind
 from tussle.documents import POSITIVE, Checked, Either, Real, Whole, check_argument, problem
 from tussle.errors import ParameterError, listed, nearest_name
 from tussle.world.scene import Scene
@@ -70,6 +71,9 @@ class Problem:
     longest: int = 20
 
     def __post_init__(self) -> None:
+        mappings = dict.fromkeys(("start", "bounds", "commands", "held"), Mapping)
+        for key, kind in {"motion": MotionModel, "scene": Scene, **mappings}.items():
+            check_kind(key, getattr(self, key), kind)
         name = type(self.motion).__name__
         self.check_names("start", self.start, self.fields)
         self.check_names("bounds", self.bounds, self.fields)

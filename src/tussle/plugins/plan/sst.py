@@ -11,6 +11,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from tussle.arguments import explained
 from tussle.documents import POSITIVE, Whole, check_argument
 from tussle.plugins.plan.kernels import admit, select
 from tussle.plugins.plan.problem import POSITION, Plan, Problem
@@ -90,6 +91,7 @@ class Tree:
         )
 
 
+@explained
 def solve(
     problem: Problem,
     *,

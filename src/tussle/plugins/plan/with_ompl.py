@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from tussle.arguments import explained
 from tussle.documents import Real, Whole, check_argument
 from tussle.errors import MissingExtraError
 from tussle.plugins.plan.problem import Plan, Problem
@@ -14,6 +15,7 @@ PLANNERS = ("RRT", "KPIECE1", "EST")
 """OMPL's SST and PDST cannot be made in Python, as of 2.0.1: their bindings have no constructors."""
 
 
+@explained
 def solve_with_ompl(problem: Problem, planner: str = "RRT", *, seed: int = 1, seconds: float = 60.0) -> Plan:
     """Search a way to the goal with a planner of OMPL (Sucan, Moll and Kavraki 2012, IEEE Robotics and Automation Magazine 19).
 

@@ -25,9 +25,11 @@ class FailingRadio(Network):
     losses = ("outage", "jammed")
 
     range = Param(math.inf, unit="m", ge=0.0, doc="Distance below which messages are received.")
-    failure_rate = Param(0.1, unit="1/s", ge=0.0, doc="Outages of a radio that begin at random, per time.")
+    failure_rate = Param(
+        0.1, unit="1/s", ge=0.0, lt=math.inf, doc="Outages of a radio that begin at random, per time."
+    )
     outage = Param(1.0, unit="s", gt=0.0, doc="Mean time that a radio is out.")
-    jam_start = Param(math.inf, unit="s", doc="Time at which jamming begins; inf for never.")
+    jam_start = Param(math.inf, unit="s", gt=-math.inf, doc="Time at which jamming begins; inf for never.")
     jam_duration = Param(math.inf, unit="s", gt=0.0, doc="Time that it lasts.")
     is_out = State(dtype=bool, per="entity", doc="Whether the radio was out at known_at.")
     known_at = State(unit="s", default=-math.inf, per="entity", doc="Time of the last message of the world.")
@@ -50,7 +52,7 @@ class FailingRadio(Network):
         """Draw which radios of some rows, (m,), are out now, given which were when they were last drawn."""
         world, known_at = w.world[rows], self.known_at[rows]
         now, rate, back = w.t[world], self.failure_rate[world], 1.0 / self.outage[world]
-        share, is_known = rate / (rate + back), np.isfinite(known_at)
+        share, is_known = rate / np.maximum(rate + back, 1e-300), np.isfinite(known_at)
         left = exp(-(rate + back) * (now - np.where(is_known, known_at, now)))
         probability = np.where(is_known, share + (self.is_out[rows] - share) * left, share)
         draw = w.uniform_by("outage", world, w.id[rows], np.zeros(len(rows), np.int64))

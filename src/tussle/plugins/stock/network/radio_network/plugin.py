@@ -66,7 +66,9 @@ class RadioNetwork(Network):
         gt=0.0,
         doc="Speed of the signal; 1500 m/s for sound in water, inf for no delay.",
     )
-    overhead = Param(28.0, ge=0.0, doc="Bytes of a message beside 8 for each number; 28 are UDP over IPv4.")
+    overhead = Param(
+        28.0, ge=0.0, lt=math.inf, doc="Bytes of a message beside 8 for each number; 28 are UDP over IPv4."
+    )
     queue_limit = Param(
         math.inf, ge=0.0, doc="Bytes waiting at a sender above which new messages are dropped."
     )
