@@ -22,6 +22,7 @@ OUTPUTS = {
     "csv": ("export", "played", "--csv", "out"),
     "parquet": ("export", "played", "--parquet", "out"),
     "mcap": ("export", "played", "--mcap", "out"),
+    "rerun": ("export", "played", "--rerun", "out"),
     "geojson": ("export", "played", "--geojson", "out"),
     "plot": ("plot", "played", "--kind", "left", "--out", "."),
     "convert": ("convert", "game.xml", "--to", "out.xml"),
@@ -55,6 +56,7 @@ def full_disk(monkeypatch):
 
 
 @pytest.mark.slow
+@pytest.mark.needs("rerun")
 def test_outputs_on_a_full_disk_leave_nothing_and_over_a_pipe_or_a_link_leave_that(
     tussle, folder, recorded, monkeypatch
 ):

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     import rerun as rr
 
 FRAMES_AT_ONCE = 256
-"""Frames whose states are sent as one column for each entity: a run need not fit in memory twice."""
+"""Frames whose states are sent as one column for each entity."""
 LEVELS = {"birth": "DEBUG", "capture": "WARN", "collision": "WARN"}
 """Level of each kind of event that is not INFO."""
 
@@ -88,21 +88,18 @@ def write_rerun(
         ) from error
     stream = rr.RecordingStream("tussle")
     writer = _Writer(recording, stream, scale * default_scale(recording))
-    with whole_file(Path(path)) as part:
-        try:
-            stream.save(part, default_blueprint=_layout(recording))
-            writer.put_scenery()
-            writer.put_events()
-            for begin in range(0, len(kept), FRAMES_AT_ONCE):
-                chunk = kept[begin : begin + FRAMES_AT_ONCE]
-                writer.put_frames(chunk)
-                if show is not None:
-                    show(begin + len(chunk), len(kept))
-            stream.flush()
-        except RuntimeError as error:  # of the thread that writes
-            raise OSError(str(error)) from error
-        finally:
-            stream.disconnect()
+    # Rerun's own files wait for ever where the disk is full; what is read in parts is no valid file.
+    encoded = stream.binary_stream()
+    with whole_file(Path(path)) as part, part.open("wb") as file:
+        stream.send_blueprint(_layout(recording))
+        writer.put_scenery()
+        writer.put_events()
+        for begin in range(0, len(kept), FRAMES_AT_ONCE):
+            chunk = kept[begin : begin + FRAMES_AT_ONCE]
+            writer.put_frames(chunk)
+            if show is not None:
+                show(begin + len(chunk), len(kept))
+        file.write(encoded.read() or b"")
     return RerunReport(Path(path), len(kept), len(writer.seen))
 
 
