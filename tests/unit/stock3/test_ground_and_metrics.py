@@ -10,7 +10,7 @@ from small_worlds import Drift, Reaper, block, mission
 
 from tussle import Simulation
 from tussle.api import Metric, MotionModel, State
-from tussle.errors import MissionError, PluginError
+from tussle.errors import MissionError, ParameterError
 from tussle.messages import EntityHitGround
 from tussle.scene import Origin, Scene
 from tussle.stock import CPA, GroundCollision, SimpleCollision, SimpleCollisionMetrics
@@ -73,7 +73,7 @@ def test_the_ground_may_be_there_for_one_team_only():
 
 
 def test_a_team_that_is_no_number_is_refused():
-    with pytest.raises(PluginError, match=r"GroundCollision\.team = 'blue' is not allowed"):
+    with pytest.raises(ParameterError, match=r"GroundCollision\.team = 'blue' is not allowed"):
         ground(team="blue")
 
 
