@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import math
+import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
@@ -123,8 +124,9 @@ def _play(game: ConformanceGame, cases: list[Case], n_steps: int) -> None:
             values = [case.value if case.name == name else plugin.values[name] for case in cases]
             params |= {f"{path}.{name}": values for path in game.paths}
     seeds = range(1, len(cases) + 1)
-    # Extreme parameters may divide by zero in between; only the results must be finite.
-    with np.errstate(all="ignore"):
+    # Extreme parameters may divide by zero in between, or be stiff; only the results must be finite.
+    with np.errstate(all="ignore"), warnings.catch_warnings():
+        warnings.filterwarnings("ignore", ".* is too stiff for substeps", RuntimeWarning)
         try:
             with Simulation(game.quiet, seeds, params, on_error="raise") as sim:
                 for step in range(n_steps):
