@@ -163,6 +163,23 @@ def test_what_tests_and_examples_import_is_in_the_test_extra(tree):
     assert not missing
 
 
+def test_no_test_module_imports_what_some_versions_of_python_lack():
+    """Their tests are to skip there, and could not be collected."""
+    extra = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]["test"]
+    lacking = {
+        IMPORTED_AS.get(name := each.split(">")[0], name) for each in extra if "python_version" in each
+    }
+    assert len(lacking) >= 4
+    found = [
+        f"{relative(path)}: {name}"
+        for path in sorted((ROOT / "tests").rglob("test_*.py"))
+        for node in ast.parse(path.read_text()).body
+        for name in [*(each.name for each in getattr(node, "names", ())), getattr(node, "module", None) or ""]
+        if isinstance(node, ast.Import | ast.ImportFrom) and name.split(".")[0] in lacking
+    ]
+    assert not found
+
+
 def test_importing_the_package_loads_no_shipped_plugin_and_no_optional_part():
     script = "import sys, tussle; print(*sys.modules)"
     run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)

@@ -494,6 +494,8 @@ def test_a_game_goes_on_without_its_database_and_obeys_it_again(lockstep):
     with Simulation(mission) as sim:
         with MoosHelm(first.port, points=((1e6, 0.0),)):
             sim.step(100)
+            while sim.read("boat.vel")[0][0, 0, 0] < 2.9:  # on a busy machine the helm answers late
+                sim.step(10)
         second, _ = restarted(sim, first)
         before = sim.read("boat.pos")[0][0, 0]
         sim.step(50)

@@ -218,6 +218,7 @@ def test_the_users_configuration_wins(ros_domain, monkeypatch):
     assert os.environ["CYCLONEDDS_URI"] == config
 
 
+@pytest.mark.needs("cyclonedds")
 @pytest.mark.parametrize("text", ["a", "-1", "233", "1.0", "²"])
 def test_a_domain_that_does_not_exist_is_refused(monkeypatch, text):
     monkeypatch.setenv("ROS_DOMAIN_ID", text)

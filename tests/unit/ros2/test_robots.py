@@ -10,9 +10,6 @@ from contextlib import ExitStack
 
 import numpy as np
 import pytest
-from cyclonedds.core import Policy, Qos
-from cyclonedds.sub import DataReader
-from cyclonedds.topic import Topic
 from nodes import DT, cars, inbox_of, link_of, peer, started
 
 from tussle import Block, Mission, Simulation
@@ -168,6 +165,10 @@ def test_topics_pause_the_game_and_make_single_steps(ros_domain):
 
 
 def test_an_imu_and_a_compass_are_heard_with_the_quality_of_sensors(ros_domain):
+    from cyclonedds.core import Policy, Qos
+    from cyclonedds.sub import DataReader
+    from cyclonedds.topic import Topic
+
     typesys = pytest.importorskip("rosbags.typesys")
     store = typesys.get_typestore(typesys.Stores.ROS2_JAZZY)
     block = Block(

@@ -74,8 +74,9 @@ def test_a_served_run_is_what_was_recorded(runs, monkeypatch, is_mapped):
             (c["name"], c["team"]): dict(zip(c["t"], c["v"], strict=True)) for c in json.loads(blob("curves"))
         }
         assert curves["left", 1][0.0] + curves["left", 2][0.0] == len(recording.frame(0))
-        with pytest.raises(HTTPError, match="404"):
+        with pytest.raises(HTTPError, match="404") as told:
             blob("chunk-999")
+        told.value.close()
 
 
 def columns_of(data, number):
@@ -148,7 +149,8 @@ def test_data_that_cannot_be_made_is_told_and_the_page_goes_on(runs, monkeypatch
         monkeypatch.setattr(recorded_data, "pack", fail)
         with pytest.raises(HTTPError, match="500") as told:
             urlopen(f"{page.url}/chunk-0", timeout=60)
-        assert b"the page: RuntimeError: no such thing" in told.value.read()
+        with told.value as answer:
+            assert b"the page: RuntimeError: no such thing" in answer.read()
         assert isinstance(page.error, RuntimeError)
         with urlopen(f"{page.url}/times", timeout=60) as answer:
             assert answer.status == 200
