@@ -51,12 +51,10 @@ def _request_births(state: SimulationState, batch: Messages) -> None:
     has_attitude = (batch.quat != 0.0).any(axis=0)
     numbers = {name: k for k, name in enumerate(view.templates)}
     number = np.array([numbers.get(str(block), -1) for block in batch.block], np.int64)
-    problems = {
-        int(
-            i
-        ): f"there is no block {batch.block[i]!r}{nearest_name(str(batch.block[i]), numbers)}; {listed(numbers)}"
-        for i in np.flatnonzero(number < 0)
-    }
+    problems: dict[int, str] = {}
+    for i in np.flatnonzero(number < 0).tolist():
+        block = batch.block[i]
+        problems[i] = f"there is no block {block!r}{nearest_name(str(block), numbers)}; {listed(numbers)}"
     for name in ("pos", "vel", "quat"):
         for i, text in problems_of_states(name, getattr(batch, name)):
             if name != "quat" or has_attitude[i]:

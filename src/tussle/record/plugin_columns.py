@@ -100,7 +100,7 @@ def select(mission: Mission, selectors: str) -> list[Source]:
 
     Args:
         mission: The mission.
-        selectors: Columns as "prey.Boids.goal", or "Boids.goal" for all blocks, or "SimpleCapture.count" of a world plugin, separated
+        selectors: Columns as "prey.Boids.goal", "Boids.goal" for all blocks, or "BulletCollision.on_ground" of a world plugin, separated
             by commas; `*` stands for any characters.
 
     Raises:

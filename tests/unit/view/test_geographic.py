@@ -287,9 +287,7 @@ def test_a_run_without_states_or_with_places_that_are_none(hunted, tmp_path, mon
     )
     with pytest.raises(ViewError, match="a position is not finite"):
         write_geographic(hunted, tmp_path / "out", "kml")
-    monkeypatch.setattr(
-        "tussle.view.export.geographic.places.kept_frames", lambda t, period: np.zeros(0, int)
-    )
+    monkeypatch.setattr("tussle.view.page.recorded.kept_frames", lambda t, period: np.zeros(0, int))
     with pytest.raises(ViewError, match="holds no states"):
         write_geographic(hunted, tmp_path / "out", "kml")
     monkeypatch.setitem(sys.modules, "scipy.spatial", None)

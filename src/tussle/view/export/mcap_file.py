@@ -24,14 +24,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tussle.documents import POSITIVE, Maybe, check_argument
+from tussle.documents import POSITIVE, check_argument
 from tussle.errors import MissingExtraError, ViewError
 from tussle.record.plugin_columns import PluginColumn
 from tussle.view.export.film.prescan import crowd_of
 from tussle.view.export.foxglove_scene import WORLD, SceneEntities, scenery_entities, stamp
 from tussle.view.export.whole_file import whole_file
 from tussle.view.frame import Frame
-from tussle.view.page.recorded import kept_frames
+from tussle.view.page.recorded import frames_to_write
 from tussle.view.recording import Recording
 
 if TYPE_CHECKING:
@@ -87,11 +87,8 @@ def write_mcap(
         ViewError: There is nothing to write, or the file cannot be written.
         MissingExtraError: The package foxglove-sdk is not installed.
     """
-    check_argument("period", period, Maybe(POSITIVE))
-    check_argument("scale", scale, Maybe(POSITIVE))
-    kept = kept_frames(recording.t, period)
-    if not len(kept):
-        raise ViewError(f"{recording.path}: the run holds no states, so there is nothing to write")
+    check_argument("scale", scale, POSITIVE)
+    kept = frames_to_write(recording, period)
     try:
         import foxglove
         from foxglove.mcap import MCAPWriteOptions

@@ -18,13 +18,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tussle.documents import POSITIVE, Maybe, check_argument
-from tussle.errors import MissingExtraError, ViewError
+from tussle.documents import POSITIVE, check_argument
+from tussle.errors import MissingExtraError
 from tussle.record.event_texts import event_text
 from tussle.view.export.foxglove_scene import GROUND, MAX_HEIGHTS, NO_TEAM
 from tussle.view.export.mcap_file import default_scale
 from tussle.view.export.whole_file import whole_file
-from tussle.view.page.recorded import kept_frames
+from tussle.view.page.recorded import frames_to_write
 from tussle.view.recording import Recording
 from tussle.view.shapes import MODELS, Mesh
 from tussle.world.rays.surfaces import MeshPart
@@ -75,11 +75,8 @@ def write_rerun(
         ViewError: There is nothing to write, or the file cannot be written.
         MissingExtraError: The package rerun-sdk is not installed.
     """
-    check_argument("period", period, Maybe(POSITIVE))
-    check_argument("scale", scale, Maybe(POSITIVE))
-    kept = kept_frames(recording.t, period)
-    if not len(kept):
-        raise ViewError(f"{recording.path}: the run holds no states, so there is nothing to write")
+    check_argument("scale", scale, POSITIVE)
+    kept = frames_to_write(recording, period)
     try:
         import rerun as rr
     except ImportError as error:

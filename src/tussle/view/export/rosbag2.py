@@ -18,7 +18,7 @@ from tussle.plugins.links.ros.robot import AT_ORIGIN, FRAMES, ROOT, height_above
 from tussle.plugins.links.ros.steps import NANO, Transform
 from tussle.view.export.whole_file import unwritable
 from tussle.view.frame import Frame
-from tussle.view.page.recorded import kept_frames
+from tussle.view.page.recorded import frames_to_write
 from tussle.view.recording import Recording
 from tussle.world.scene import Scene
 
@@ -71,7 +71,7 @@ def write_rosbag2(
 
     Raises:
         ViewError: There is nothing to write, the bag cannot be written, or a time does not fit.
-        ParameterError: The format is none of STORAGES.
+        ParameterError: The format is none of STORAGES, or the period is not allowed.
         MissingExtraError: rosbags is not installed.
     """
     try:
@@ -82,9 +82,7 @@ def write_rosbag2(
         ) from None
     if storage not in STORAGES:
         raise ParameterError(f"storage = {storage!r} is not allowed; allowed are {', '.join(STORAGES)}")
-    target, kept = Path(path), kept_frames(recording.t, period)
-    if not len(kept):
-        raise ViewError(f"{recording.path}: the run holds no states, so there is nothing to write")
+    target, kept = Path(path), frames_to_write(recording, period)
     if target.exists() and not (target / METADATA).is_file():
         raise unwritable(target, "it exists and is no rosbag2")
     scene = recording.mission.scene if recording.mission else Scene()

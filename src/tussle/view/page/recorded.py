@@ -261,6 +261,20 @@ def kept_frames(t: np.ndarray, period: float | None) -> np.ndarray:
     return np.flatnonzero(is_kept)
 
 
+def frames_to_write(recording: Recording, period: float | None) -> np.ndarray:
+    """Return the numbers of the frames that an export writes, see `kept_frames`.
+
+    Raises:
+        ParameterError: The period is not allowed.
+        ViewError: The run holds no states.
+    """
+    check_argument("period", period, Maybe(POSITIVE))
+    kept = kept_frames(recording.t, period)
+    if not len(kept):
+        raise ViewError(f"{recording.path}: the run holds no states, so there is nothing to write")
+    return kept
+
+
 def chunk_bounds(counts: np.ndarray, n_states: int, least_frames: int) -> list[tuple[int, int]]:
     """Return first and last frame of chunks of about n_states states. Each chunk starts with the last frame of the previous one.
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from tussle.errors import MissingExtraError, ViewError
 from tussle.record.schema import MISSION_FILE
-from tussle.view.page.recorded import kept_frames
+from tussle.view.page.recorded import frames_to_write
 from tussle.view.recording import Recording
 from tussle.view.scenery import Region
 from tussle.world.geodesy import Origin
@@ -102,10 +102,11 @@ def tracks_of(
         show: Called after each track with the numbers of tracks made and to make.
 
     Raises:
+        ParameterError: The period is not allowed.
         ViewError: The run has no origin or no states, or a position is not finite.
     """
     origin = origin_of(recording)
-    frames = [recording.frame(int(i)) for i in kept_frames(recording.t, period)]
+    frames = [recording.frame(int(i)) for i in frames_to_write(recording, period)]
     who = np.concatenate([np.zeros(0, int), *(frame.id for frame in frames)])
     if not len(who):
         raise ViewError(f"{recording.path}: the run holds no states, so there is nothing to write")
