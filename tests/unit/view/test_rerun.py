@@ -1,6 +1,10 @@
 """A recording for Rerun tells the whole run on the timeline of simulated time."""
 
+import re
+import sys
+import tomllib
 from collections import defaultdict
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -134,12 +138,26 @@ def test_what_stands_is_there_at_all_times(hunted, tmp_path, monkeypatch):
 
 
 def test_what_cannot_be_is_refused_and_leaves_nothing(hunted, tmp_path, monkeypatch):
-    monkeypatch.setitem(__import__("sys").modules, "rerun", None)
+    monkeypatch.setitem(sys.modules, "rerun", None)
     with pytest.raises(MissingExtraError, match=r"rerun-sdk, .* pip install 'tussle\[rerun\]'"):
         write_rerun(hunted, tmp_path / "a.rrd")
     with pytest.raises(ParameterError, match="takes a number > 0"):
         write_rerun(hunted, tmp_path / "a.rrd", period=0.0)
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.needs("rerun")
+def test_the_extra_brings_all_that_is_needed(hunted, tmp_path, monkeypatch):
+    project = tomllib.loads((Path(__file__).parents[3] / "pyproject.toml").read_text())["project"]
+    view, own = (
+        {re.split(r"[->]", each)[0] for each in project["optional-dependencies"][extra]}
+        for extra in ("view", "rerun")
+    )
+    lacking = view - own
+    assert "foxglove" in lacking
+    for name in {*lacking, *(each for each in sys.modules if each.split(".")[0] in lacking)}:
+        monkeypatch.setitem(sys.modules, name, None)
+    assert write_rerun(hunted, tmp_path / "a.rrd", period=10.0).n_frames
 
 
 @pytest.mark.needs("rerun")
