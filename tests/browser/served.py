@@ -84,10 +84,16 @@ class Watched:
         self.tab.keyboard.press(key)
 
     def choose(self, who: int) -> None:
-        """Choose an entity by a click on it."""
-        self.wait(f"player.isDrawn && player.pixelOf({who})")
-        self.tab.mouse.click(*self.tab.evaluate(f"() => player.pixelOf({who})"))
-        self.wait(f"player.chosen === {who}")
+        """Choose an entity by a click on it; click again if it has moved on before the click came."""
+
+        def is_chosen() -> bool:
+            if self.tab.evaluate("() => player.chosen") == who:
+                return True
+            if pixel := self.tab.evaluate(f"() => player.isDrawn && player.pixelOf({who})"):
+                self.tab.mouse.click(*pixel)
+            return False
+
+        self.until(is_chosen)
 
     def close(self) -> None:
         self.tab.close()

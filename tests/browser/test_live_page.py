@@ -44,6 +44,8 @@ def at(live, step):
 
 def test_the_page_shows_the_beginning(game):
     live, _, watched = game
+    live.seek(0.0)
+    live.settle()
     assert watched.tab.locator("#head h1").inner_text() == "hunt"
     watched.wait("player.t === 0 && player.frame === 0")
     assert sorted(watched.tab.evaluate("() => player.ids")) == live.frame().id.tolist()
@@ -52,6 +54,8 @@ def test_the_page_shows_the_beginning(game):
 
 def test_buttons_step_play_and_pause(game):
     live, _, watched = game
+    live.seek(0.0)
+    live.settle()
     watched.button("A step on")
     watched.until(at(live, 1))
     watched.wait("player.frame === 1")

@@ -202,8 +202,9 @@ def test_about_says_what_is_played(game):
 
 
 def test_the_time_line_reaches_to_the_end_of_the_mission(game):
-    _, watched = game
-    watched.wait("player.isDrawn")
+    live, watched = game
+    live.seek(6.0)
+    watched.wait("player.t === 6 && player.isDrawn")
     assert watched.tab.locator("#time").evaluate(
         "(s) => [Number(s.min), Number(s.max), Number(s.value)]"
     ) == [0, 30, 6]
