@@ -17,6 +17,8 @@ import needs
 import pytest
 from hypothesis import HealthCheck, settings
 
+# Each worker, and each program that a test starts, has its share of the cores; threads of linear algebra wait for each other in loops.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 settings.register_profile("untimed", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("untimed")
 

@@ -410,6 +410,8 @@ class Plugin:
         cls = type(self)
         if name in cls.columns:  # Column.__get__ raises the error: the plugin is not bound
             return cls.columns[name].__get__(self, cls)
+        if name.startswith("__"):  # copying and pickling ask for many
+            raise AttributeError(name)
         allowed = [n for n in (*cls.columns, *dir(cls)) if not n.startswith("_")]
         raise AttributeError(
             f"{cls.__name__} has no {name!r}{nearest_name(name, allowed)}; {listed(cls.columns)}"

@@ -2,7 +2,7 @@
 
 C. E. Rasmussen and C. K. I. Williams, Gaussian Processes for Machine Learning (2006). Matérn's kernel with 5/2 over numbers, one
 correlation between any two values of a choice, and the largest posterior density of the lengths and the noise; Laplace's
-approximation for shares (3.4 and 5.5.1).
+approximation for shares (3.4 and 5.5.1), and the slopes of its evidence (5.4.1 and 5.5.1).
 """
 
 from __future__ import annotations
@@ -17,8 +17,6 @@ from tussle.batch.statistics import SEED, scipy_package
 
 MAX_TUNED = 200
 """So many points, evenly spaced by number, choose lengths and noise."""
-DIFFERENCE = 1e-4
-"""Difference for the slopes of the evidence, which is rounded to about 1e-8: with one of that size, slopes are noise."""
 JITTER = 1e-8
 N_DRAWS = 200
 MAX_DRAWN = 200
@@ -71,6 +69,11 @@ class Observed:
         value = float((self.weight * (self.mean * f - np.logaddexp(0.0, f))).sum())
         return self.weight * (self.mean - p), self.weight * p * (1.0 - p), value
 
+    def third(self, f: np.ndarray) -> np.ndarray:
+        """Third derivative of the logarithm of the likelihood of shares, (n,)."""
+        p = scipy_package().special.expit(f)
+        return np.asarray(self.weight * p * (1.0 - p) * (2.0 * p - 1.0))
+
 
 @dataclass(frozen=True)
 class Covariance:
@@ -95,8 +98,8 @@ class Covariance:
         r = apart * (math.sqrt(5.0) / self.shape[i])
         return np.asarray((1.0 + r + r * r / 3.0) * np.exp(-r))
 
-    def of(self, apart: np.ndarray) -> np.ndarray:
-        """Covariance of the fit at pairs of rows, (n, m).
+    def varying(self, apart: np.ndarray) -> np.ndarray:
+        """Covariance of what varies at pairs of rows, (n, m).
 
         Args:
             apart: Their distances along each axis, (n_axes, n, m).
@@ -104,11 +107,19 @@ class Covariance:
         found = np.full(apart.shape[1:], self.amplitude)
         for i, along in enumerate(apart):
             found *= self.factor(i, along)
-        return found + CONSTANT
+        return found
+
+    def growth(self, i: int, apart: np.ndarray) -> np.ndarray:
+        """Slope of the logarithm of the correlation along one axis, by the logarithm of its length or the logit of its correlation."""
+        if not self.is_number[i]:
+            return np.where(apart == 0.0, 0.0, 1.0 - self.shape[i])
+        r = apart * (math.sqrt(5.0) / self.shape[i])
+        square = r * r
+        return np.asarray((square + square * r) / (3.0 + 3.0 * r + square))
 
     def __call__(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
         """Covariance of the fit at rows of coordinates, (len(a), len(b))."""
-        return self.of(distances(a, b))
+        return self.varying(distances(a, b)) + CONSTANT
 
 
 def distances(a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -123,11 +134,11 @@ class Posterior:
     """
 
     def __init__(
-        self, kernel: Covariance, x: np.ndarray, observed: Observed, apart: np.ndarray | None = None
+        self, kernel: Covariance, x: np.ndarray, observed: Observed, varying: np.ndarray | None = None
     ) -> None:
         linalg = scipy_package().linalg
         self.kernel, self.x = kernel, x
-        whole = kernel.of(distances(x, x) if apart is None else apart)
+        whole = (kernel.varying(distances(x, x)) if varying is None else varying) + CONSTANT
         whole[np.diag_indices(len(x))] += kernel.noise + JITTER
         f, a = np.zeros(len(x)), np.zeros(len(x))
         if observed.is_share:  # a good place to begin
@@ -162,6 +173,37 @@ class Posterior:
         return between @ self.a, self.kernel(rows, rows) - half.T @ half
 
 
+def evidence_slopes(
+    mode: Posterior, observed: Observed, apart: np.ndarray, varying: np.ndarray
+) -> np.ndarray:
+    """Slopes of the evidence by the logarithms of amplitude and noise, and by each axis as in `Covariance.growth`, (2 + n_axes,).
+
+    Rasmussen and Williams, algorithm 5.1.
+
+    Args:
+        mode: The posterior at the points.
+        observed: What was observed there.
+        apart: Their distances along each axis, (n_axes, n, n).
+        varying: `Covariance.varying` of these.
+    """
+    kernel, root = mode.kernel, mode.root
+    inverse = root[:, None] * scipy_package().linalg.cho_solve((mode.factor, True), np.diag(root))
+    slope = observed.slopes(mode.f)[0]
+    # The slope by the covariance of each pair: where the mode stands still, and by its move, which changes the curvature of shares.
+    by_pair = 0.5 * (np.outer(mode.a, mode.a) - inverse)
+    if observed.is_share:
+        whole = varying + CONSTANT
+        whole[np.diag_indices(len(whole))] += kernel.noise + JITTER
+        solved = inverse @ whole
+        spread = whole.diagonal() - (whole * solved).sum(axis=0)
+        by_mode = 0.5 * spread * observed.third(mode.f)
+        by_pair += np.outer(by_mode - solved @ by_mode, slope)
+    by_noise = kernel.noise * by_pair.trace()
+    by_pair *= varying
+    by_shape = [float((by_pair * kernel.growth(i, along)).sum()) for i, along in enumerate(apart)]
+    return np.array([by_pair.sum(), by_noise, *by_shape])
+
+
 def _kernel_of(is_number: Sequence[bool], theta: np.ndarray) -> Covariance:
     shape = [
         math.exp(value) if is_length else 1.0 / (1.0 + math.exp(-value))
@@ -185,13 +227,17 @@ def tuned_kernel(is_number: Sequence[bool], x: np.ndarray, observed: Observed) -
 
     apart = distances(x, x)
 
-    def loss(theta: np.ndarray) -> float:
-        evidence = Posterior(_kernel_of(is_number, theta), x, observed, apart).evidence
-        return -evidence + 0.5 * float((((theta - middle) / sd) ** 2).sum())
+    def loss(theta: np.ndarray) -> tuple[float, np.ndarray]:
+        kernel, off = _kernel_of(is_number, theta), (theta - middle) / sd
+        varying = kernel.varying(apart)
+        mode = Posterior(kernel, x, observed, varying)
+        slopes = off / sd - evidence_slopes(mode, observed, apart, varying)
+        return 0.5 * float((off**2).sum()) - mode.evidence, slopes
 
     bounds = [(m - 4.0 * s, m + 4.0 * s) for m, s in zip(centre, spread, strict=True)]
-    options = {"maxiter": 60, "ftol": 1e-7, "eps": DIFFERENCE}
-    found = scipy_package().optimize.minimize(loss, middle, method="L-BFGS-B", bounds=bounds, options=options)
+    options = {"maxiter": 60, "ftol": 1e-7}
+    minimize = scipy_package().optimize.minimize
+    found = minimize(loss, middle, method="L-BFGS-B", jac=True, bounds=bounds, options=options)
     return _kernel_of(is_number, found.x)
 
 

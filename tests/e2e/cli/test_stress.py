@@ -142,6 +142,7 @@ RARE = (
 )
 
 
+@pytest.mark.slow
 def test_importance_sampling_of_a_start_position(tussle, folder):
     """The distance at the end is 6 m less than a normal number: it fails beyond 5 standard deviations."""
     done = tussle(*RARE, "--why", "--holds", "0.99")

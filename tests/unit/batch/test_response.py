@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from made_batches import made_batch
 
+from tussle.batch.gaussian_process import Covariance, Observed, Posterior, distances, evidence_slopes
 from tussle.batch.response import MIN_POINTS, fitted, point_means
 from tussle.batch.results import Results
 from tussle.batch.sampling import sample
@@ -141,3 +142,27 @@ def test_a_quantity_that_does_not_vary_is_a_flat_line():
     ones = fitted([UAV, TACTIC], points, np.ones((5, 9)), is_share=True).along("uav", [5, 20])
     assert (ones.low < 1.0).all()
     assert (ones.value > 0.95).all()
+
+
+@pytest.mark.parametrize("is_share", [False, True])
+@pytest.mark.parametrize("theta", [(0.3, -2.0, -0.5, 0.2, 0.7), (-1.0, -5.0, 1.5, 0.2, -0.7)])
+def test_slopes_of_the_evidence_are_its_differences(is_share, theta):
+    rng = np.random.default_rng(1)
+    x = np.c_[rng.uniform(size=(60, 2)), rng.integers(0, 3, 60)]
+    mean = np.sin(5.0 * x[:, 0]) + 0.3 * rng.normal(size=60)
+    if is_share:
+        mean = rng.binomial(5, 1.0 / (1.0 + np.exp(-2.0 * mean))) / 5.0
+    observed = Observed(mean, rng.uniform(5.0, 15.0, 60), 0.0, 0.0, 1.0, is_share, None)
+
+    def kernel(theta):
+        amplitude, noise, long, wide, choice = theta
+        shape = (np.exp(long), np.exp(wide), 1.0 / (1.0 + np.exp(-choice)))
+        return Covariance(np.exp(amplitude), shape, (True, True, False), np.exp(noise))
+
+    def evidence(theta):
+        return Posterior(kernel(theta), x, observed).evidence
+
+    varying = kernel(theta).varying(distances(x, x))
+    slopes = evidence_slopes(Posterior(kernel(theta), x, observed), observed, distances(x, x), varying)
+    steps = 1e-3 * np.eye(5)
+    assert slopes == pytest.approx([(evidence(theta + h) - evidence(theta - h)) / 2e-3 for h in steps], rel=1e-3, abs=1e-3)  # fmt: skip
