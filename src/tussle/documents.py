@@ -190,6 +190,15 @@ def is_whole(value: Any) -> bool:
     return isinstance(value, numbers.Integral) and not isinstance(value, bool)
 
 
+MAX_DIGITS = 18
+"""So many digits are a whole number of 64 bits."""
+
+
+def is_count(text: str) -> bool:
+    """Whether a text is a whole number from 0 on, such that `int` reads it: of digits such as ², `str.isdigit` is true, too."""
+    return text.isascii() and text.isdigit() and len(text) <= MAX_DIGITS
+
+
 def several(given: Iterable[Any]) -> tuple[Any, ...]:
     """Items of an argument that takes several texts or paths; a text or path alone is one."""
     return (given,) if isinstance(given, (str, PurePath)) else tuple(given)

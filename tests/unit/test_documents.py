@@ -8,6 +8,8 @@ import time
 
 import numpy as np
 import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
 
 from tussle.documents import (
     MAX_BYTES,
@@ -22,6 +24,7 @@ from tussle.documents import (
     Team,
     Whole,
     check_argument,
+    is_count,
     problem,
     read_text,
     size_of,
@@ -159,3 +162,14 @@ def test_a_positive_number_of_any_kind_is_taken(value):
 def test_all_else_is_refused_with_the_name_and_the_rule(value):
     with pytest.raises(ParameterError, match=r"period = .* is not allowed; it takes a number > 0"):
         check_argument("period", value, POSITIVE)
+
+
+@given(st.one_of(st.text(), st.text(st.characters(categories=("Nd", "No"))), st.integers().map(str)))
+@example("²")
+@example("9" * 5000)
+def test_a_text_counts_where_it_is_a_whole_number_of_64_bits(text):
+    if is_count(text):
+        assert 0 <= int(text) < 2**63
+        assert f"{int(text):0{len(text)}}" == text
+    else:
+        assert text not in map(str, range(1000))

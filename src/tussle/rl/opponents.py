@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from tussle.documents import is_count
 from tussle.errors import ParameterError, listed
 from tussle.mission import Mission
 from tussle.numeric import rng
@@ -137,7 +138,7 @@ def _slots(entry: str) -> list[tuple[str, Path | None]]:
     """
     given, equals, number = entry.strip().rpartition("=")
     given, number = (given, number) if equals else (number, "1")
-    if not number.isdecimal() or not 0 < len(number) <= 3 or not given:
+    if not is_count(number) or len(number) > 3 or not given:
         raise ParameterError(
             f"opponent {entry!r} is not allowed; it takes latest, past, or an ONNX file or folder, and after it =3 for three slots"
         )

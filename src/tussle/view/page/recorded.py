@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from tussle.declare import displays
-from tussle.documents import POSITIVE, Maybe, check_argument
+from tussle.documents import POSITIVE, Maybe, check_argument, is_count
 from tussle.errors import ViewError
 from tussle.mission import Mission
 from tussle.view.page.chunks import ANGLE_ERROR, FULL_HEALTH, UNIT, pack, position_error, step_of
@@ -190,7 +190,7 @@ class RecordedData:
             "columns": self._n_column_blobs,
             "shapes": self._n_shape_blobs,
         }.get(kind, 0)
-        if not number.isdecimal() or len(number) > 9 or int(number) >= n_blobs:
+        if not is_count(number) or int(number) >= n_blobs:
             return None
         if kind == "shapes":
             return self._shapes(int(number) * SHAPE_FRAMES)
@@ -228,7 +228,7 @@ class RecordedData:
 
     def _column(self, who: str, column: str) -> bytes | None:
         """Changes of a column of an entity, in each run that has it."""
-        if not who.isdecimal() or len(who) > 9 or column not in self._quantities:
+        if not is_count(who) or column not in self._quantities:
             return None
         runs = [run for run in self._runs if column in quantities_of(run[0])]
         changes = [column_changes(run, int(who), column, id_shift) for run, _, id_shift in runs]
