@@ -44,9 +44,9 @@ def read_bytes(path: Path, error: type[TussleError], most: int = MAX_BYTES) -> b
         TussleError: As `error`: the file is not a regular file, or is larger than `most` bytes.
     """
     try:
-        size_of(path, most)
+        n = size_of(path, most)
         with path.open("rb") as file:
-            return file.read(most)
+            return file.read(n)  # Python reserves as much memory as may be read
     except (OSError, ValueError) as reason:
         raise error(f"{path}: cannot be read: {getattr(reason, 'strerror', None) or reason}") from None
 

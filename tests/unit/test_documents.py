@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import time
+import tracemalloc
 
 import numpy as np
 import pytest
@@ -30,6 +31,7 @@ from tussle.documents import (
     size_of,
 )
 from tussle.errors import ParameterError, RecordError
+from tussle.folders import real_path
 
 THING = Document(
     "the thing",
@@ -173,3 +175,24 @@ def test_a_text_counts_where_it_is_a_whole_number_of_64_bits(text):
         assert f"{int(text):0{len(text)}}" == text
     else:
         assert text not in map(str, range(1000))
+
+
+def test_a_limit_of_four_gigabytes_takes_no_memory(tmp_path):
+    (tmp_path / "small").write_text("small")
+    tracemalloc.start()
+    try:
+        assert read_text(tmp_path / "small", RecordError, 1 << 32) == "small"
+        assert tracemalloc.get_traced_memory()[1] < 1 << 20
+    finally:
+        tracemalloc.stop()
+
+
+def test_links_are_followed_and_a_loop_of_them_cannot_be_opened(tmp_path):
+    for name, to in (("a", "b"), ("b", "a"), ("c", "real")):
+        (tmp_path / name).symlink_to(to)
+    (tmp_path / "real").write_text("here")
+    assert real_path(tmp_path / "c") == real_path(tmp_path) / "real"
+    with pytest.raises(OSError, match="symbolic links"):
+        real_path(tmp_path / "a").open()
+    with pytest.raises(RecordError, match="a: cannot be read: Too many levels"):
+        read_text(tmp_path / "a", RecordError)

@@ -14,6 +14,7 @@ import numpy as np
 from tussle.declare import displays
 from tussle.documents import POSITIVE, Maybe, check_argument, is_count
 from tussle.errors import ViewError
+from tussle.folders import real_path
 from tussle.mission import Mission
 from tussle.view.page.chunks import ANGLE_ERROR, FULL_HEALTH, UNIT, pack, position_error, step_of
 from tussle.view.page.compare import Comparison
@@ -306,7 +307,7 @@ def comparison_data(game: Comparison) -> list[dict[str, Any]]:
     return [
         {
             "name": name,
-            "title": run.path.resolve().name,
+            "title": real_path(run.path).name,
             "teams": [team + shift for team in run.teams],
             "teamShift": shift,
         }
@@ -328,7 +329,7 @@ def game_facts(game: Recording | Comparison) -> list[tuple[str, str]]:
     info, t = game.run.info, game.t
     names = {str(team): name for team, name in game.teams.items()}
     worlds = info.get("worlds", [])
-    facts = [("Run", game.path.resolve().name)]
+    facts = [("Run", real_path(game.path).name)]
     if game.world < len(worlds):
         world = worlds[game.world]
         facts.append(("Seed", str(world["seed"])))
