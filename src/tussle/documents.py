@@ -44,9 +44,9 @@ def read_bytes(path: Path, error: type[TussleError], most: int = MAX_BYTES) -> b
         TussleError: As `error`: the file is not a regular file, or is larger than `most` bytes.
     """
     try:
-        size_of(path, most)
+        n = size_of(path, most)
         with path.open("rb") as file:
-            return file.read(most)
+            return file.read(n)  # Python reserves as much memory as may be read
     except (OSError, ValueError) as reason:
         raise error(f"{path}: cannot be read: {getattr(reason, 'strerror', None) or reason}") from None
 
@@ -188,6 +188,15 @@ def problem(value: Any, rule: Rule, where: str = "") -> str:
 def is_whole(value: Any) -> bool:
     """Whether a value is a whole number, of Python or of NumPy, and no truth value."""
     return isinstance(value, numbers.Integral) and not isinstance(value, bool)
+
+
+MAX_DIGITS = 18
+"""So many digits are a whole number of 64 bits."""
+
+
+def is_count(text: str) -> bool:
+    """Whether a text is a whole number from 0 on, such that `int` reads it: of digits such as ², `str.isdigit` is true, too."""
+    return text.isascii() and text.isdigit() and len(text) <= MAX_DIGITS
 
 
 def several(given: Iterable[Any]) -> tuple[Any, ...]:

@@ -32,6 +32,14 @@ def user_folder(variable: str, usual: str) -> Path | None:
     return None
 
 
+def real_path(path: Path) -> Path:
+    """Absolute path with all links followed; where links lead to each other, one that cannot be opened.
+
+    `Path.resolve` raises RuntimeError on such links before Python 3.13.
+    """
+    return Path(os.path.realpath(path))
+
+
 def is_own(found: os.stat_result) -> bool:
     """Return True if a file belongs to the user and no other user can write it."""
     if not hasattr(os, "geteuid"):  # Windows: the access lists of the user's folders keep other users out

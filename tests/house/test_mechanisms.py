@@ -62,6 +62,24 @@ def test_files_of_the_user_are_written_whole():
     assert not found
 
 
+def test_whether_a_text_is_a_number_is_asked_once():
+    """Of digits such as ², which `int` does not read, `str.isdigit` is true."""
+    found = {
+        relative(path)
+        for path in python_files("src")
+        if re.search(r"\.is(digit|decimal|numeric)\b", path.read_text(encoding="utf-8"))
+    }
+    assert found == {"src/tussle/documents.py"}, "take tussle.documents.is_count"
+
+
+def test_links_are_followed_by_one_function():
+    """Of links that lead to each other, `Path.resolve` raises an error that nobody awaits, before Python 3.13."""
+    found = [
+        relative(path) for path in python_files("src") if ".resolve()" in path.read_text(encoding="utf-8")
+    ]
+    assert not found, "take tussle.folders.real_path"
+
+
 def test_the_rule_sees_calls():
     assert calls(ast.parse("def f():\n    exec(text, {})"), ("exec",))
     assert not calls(ast.parse("executor.submit(exec_all)"), ("exec",))

@@ -5,9 +5,12 @@ from __future__ import annotations
 import json
 import os
 import time
+import tracemalloc
 
 import numpy as np
 import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
 
 from tussle.documents import (
     MAX_BYTES,
@@ -22,11 +25,13 @@ from tussle.documents import (
     Team,
     Whole,
     check_argument,
+    is_count,
     problem,
     read_text,
     size_of,
 )
 from tussle.errors import ParameterError, RecordError
+from tussle.folders import real_path
 
 THING = Document(
     "the thing",
@@ -159,3 +164,35 @@ def test_a_positive_number_of_any_kind_is_taken(value):
 def test_all_else_is_refused_with_the_name_and_the_rule(value):
     with pytest.raises(ParameterError, match=r"period = .* is not allowed; it takes a number > 0"):
         check_argument("period", value, POSITIVE)
+
+
+@given(st.one_of(st.text(), st.text(st.characters(categories=("Nd", "No"))), st.integers().map(str)))
+@example("²")
+@example("9" * 5000)
+def test_a_text_counts_where_it_is_a_whole_number_of_64_bits(text):
+    if is_count(text):
+        assert 0 <= int(text) < 2**63
+        assert f"{int(text):0{len(text)}}" == text
+    else:
+        assert text not in map(str, range(1000))
+
+
+def test_a_limit_of_four_gigabytes_takes_no_memory(tmp_path):
+    (tmp_path / "small").write_text("small")
+    tracemalloc.start()
+    try:
+        assert read_text(tmp_path / "small", RecordError, 1 << 32) == "small"
+        assert tracemalloc.get_traced_memory()[1] < 1 << 20
+    finally:
+        tracemalloc.stop()
+
+
+def test_links_are_followed_and_a_loop_of_them_cannot_be_opened(tmp_path):
+    for name, to in (("a", "b"), ("b", "a"), ("c", "real")):
+        (tmp_path / name).symlink_to(to)
+    (tmp_path / "real").write_text("here")
+    assert real_path(tmp_path / "c") == real_path(tmp_path) / "real"
+    with pytest.raises(OSError, match="symbolic links"):
+        real_path(tmp_path / "a").open()
+    with pytest.raises(RecordError, match="a: cannot be read: Too many levels"):
+        read_text(tmp_path / "a", RecordError)

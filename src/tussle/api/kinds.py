@@ -12,7 +12,7 @@ from tussle.api.plugin import HistoricAttributes, Plugin
 from tussle.api.results import named, number
 from tussle.api.row_laws import step_rows
 from tussle.api.world import WorldView
-from tussle.declare.columns import EntityRef, Output, Param
+from tussle.declare.columns import EntityRef, Numbers, Output, Param, State
 from tussle.declare.messages import Messages
 from tussle.errors import DeclarationError, ParameterError
 from tussle.world.scene import HeightField, TeamRegion, Volume
@@ -52,6 +52,13 @@ class EntityPlugin(Plugin):
     def step(self, g: GroupView) -> None:
         """Perform one step of all rows."""
         raise TypeError(f"{type(self).__name__} has no step")
+
+
+def row_shape(plugin: Plugin, column: Numbers) -> tuple[int, ...]:
+    """Shape of one row's value of a plugin's column that is not ragged: () or (k,), with the components that `state_size` adds."""
+    has_size = isinstance(plugin, EntityPlugin) and isinstance(column, State)
+    k = plugin.state_size(column.name) if has_size else len(column.fields)
+    return (k,) if k else ()
 
 
 class Autonomy(EntityPlugin):

@@ -37,6 +37,7 @@ from tussle.declare.displays import counted, line, listing, page, table
 from tussle.documents import POSITIVE, Maybe, check_argument, several
 from tussle.engine.simulation import Simulation
 from tussle.errors import BatchError, ParameterError, PluginError
+from tussle.folders import real_path
 from tussle.mission import Loaded, Mission, PluginFile, read_mission
 from tussle.mission.effects import exactly
 from tussle.notebook_bar import Show, notebook_bar
@@ -309,8 +310,8 @@ class Batch:
         """
         if self.loaded is None:
             return {}
-        home = self.loaded.path.parent.resolve()
-        inside = {file.resolve(): data for file, data in self._files.items()}
+        home = real_path(self.loaded.path.parent)
+        inside = {real_path(file): data for file, data in self._files.items()}
         found = {
             str(file.relative_to(home)): data for file, data in inside.items() if file.is_relative_to(home)
         }

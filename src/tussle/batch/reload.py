@@ -14,6 +14,7 @@ from tussle.batch.points import settings_of
 from tussle.batch.results import Results
 from tussle.batch.trust import DirectoryCode
 from tussle.errors import BatchError
+from tussle.folders import real_path
 from tussle.mission import Loaded, Mission, PluginFile, read_mission
 from tussle.record.input_table import load_inputs
 from tussle.record.inputs import ExternalInput
@@ -86,7 +87,7 @@ def recorded_run(
         )
         raise BatchError(f"{path}: world {world} cannot be played again; {known}")
     code = DirectoryCode(path, copied_plugins(path))
-    if not (path / MISSION_FILE).resolve().is_relative_to(path.resolve()):
+    if not real_path(path / MISSION_FILE).is_relative_to(real_path(path)):
         raise BatchError(f"{path}: {MISSION_FILE} is outside of the run directory, so it is not read")
     if not may_run(code):
         raise BatchError(f"{path}: {_not_known(code)}")
@@ -176,7 +177,7 @@ def _inside(path: Path, name: str) -> Path:
     """
     file = path / store.MISSION / name.replace("\0", "")
     try:
-        is_inside = file.resolve().is_relative_to(path.resolve() / store.MISSION)
+        is_inside = real_path(file).is_relative_to(real_path(path) / store.MISSION)
     except (OSError, RuntimeError) as error:  # links in a circle
         raise BatchError(f"{path}: {name} cannot be read: {error}") from None
     if not is_inside:

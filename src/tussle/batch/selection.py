@@ -8,6 +8,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from tussle.batch.variables import Choice, Range, Variable
+from tussle.documents import is_count
 from tussle.errors import ParameterError, listed, nearest_name
 from tussle.mission.codecs import written as text_of
 
@@ -85,7 +86,7 @@ def paired_points(
 
 def is_number(side: int | str) -> bool:
     """Return True if a point is given by its number."""
-    return not isinstance(side, str) or (side.strip().isascii() and side.strip().isdigit())
+    return not isinstance(side, str) or is_count(side.strip())
 
 
 def written(value: Any) -> str:

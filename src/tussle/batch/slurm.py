@@ -16,6 +16,7 @@ from typing import Any
 
 from tussle.batch.dask_runner import OnDask, connect, missing_extra
 from tussle.batch.executors import Executor
+from tussle.documents import is_count
 from tussle.errors import BatchError, ParameterError, listed, nearest_name
 
 ALIASES = {"queue": "partition", "mem": "memory", "time": "walltime"}
@@ -88,7 +89,7 @@ class Jobs:
 
 
 def _count(text: str, name: str, value: str) -> int:
-    if not value.isdigit() or int(value) < 1:
+    if not is_count(value) or int(value) < 1:
         raise ParameterError(f"--slurm {text!r}: {name} is {value!r}, but is a whole number >= 1; {TAKES}")
     return int(value)
 

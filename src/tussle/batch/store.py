@@ -19,7 +19,7 @@ import pyarrow.compute as pc
 from tussle.batch.consistency import check_design, check_metrics, check_results
 from tussle.batch.schemas import BATCH, RULES
 from tussle.batch.tasks import Finished
-from tussle.documents import json_text
+from tussle.documents import is_count, json_text
 from tussle.errors import BatchError, RecordError
 from tussle.folders import lock, open_safely
 from tussle.record.arrow_file import read_batches
@@ -249,7 +249,7 @@ class Store:
         if self._stream is None:
             with reported(self.path):
                 (self.path / PARTS).mkdir(exist_ok=True)
-                taken = [int(p.stem) for p in (self.path / PARTS).glob("*.arrow") if p.stem.isdigit()]
+                taken = [int(p.stem) for p in (self.path / PARTS).glob("*.arrow") if is_count(p.stem)]
                 self._stream = Stream(self.path / PARTS / f"{max(taken, default=0) + 1:04d}.arrow", PLAYED)
         self._stream.write(row(finished))
 

@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-from tussle.folders import is_private, read_own, user_folder
+from tussle.folders import is_private, read_own, real_path, user_folder
 from tussle.mission import PluginFile
 
 
@@ -30,7 +30,7 @@ class DirectoryCode:
         return not self.files or _is_known(digest(self.files))
 
     def __str__(self) -> str:
-        home = self.path.resolve()
+        home = real_path(self.path)
         texts = {Path(file.folder, name): text for file in self.files for name, text in file.texts.items()}
         return ", ".join(
             f"{self.path / path.relative_to(home)} ({len(text):,} characters)" for path, text in texts.items()

@@ -19,6 +19,7 @@ from tussle.cli.options import read_time
 from tussle.cli.progress import ProgressMeter, home_short
 from tussle.cli.terminal import INTERRUPTED, NOT_WRITTEN, OK, code_of, out, say, say_error, say_note
 from tussle.errors import ParameterError, TussleError, ViewError
+from tussle.folders import real_path
 from tussle.record.schema import FILES
 from tussle.view.export.film import FilmOptions
 from tussle.view.recording import Recording
@@ -173,7 +174,7 @@ class _Exporter:
     def __init__(self, options: ExportOptions) -> None:
         self._options, self._film = options, film_options(options)
         self._notes: set[str] = set()
-        self._recorded = {(options.run / name).resolve() for name in FILES}
+        self._recorded = {real_path(options.run / name) for name in FILES}
         self._written: dict[Path, str] = {}
 
     @cached_property
@@ -210,13 +211,13 @@ class _Exporter:
         writers[kind](kind, path)
 
     def _check(self, kind: str, path: Path, others: Iterable[Path]) -> None:
-        place = path.resolve()
+        place = real_path(path)
         owner = "the recording" if place in self._recorded else self._written.get(place)
-        if owner or place in [other.resolve() for other in others]:
+        if owner or place in [real_path(other) for other in others]:
             raise ViewError(f"{path}: cannot be written: it is a file of {owner}; name another for --{kind}")
 
     def _report(self, kind: str, path: Path, text: str) -> None:
-        self._written[path.resolve()] = f"--{kind}"
+        self._written[real_path(path)] = f"--{kind}"
         out().print(f"{home_short(path)}: {text}, {size_of(path)}", soft_wrap=True)
 
     def _say_notes(self, notes: Iterable[str]) -> None:

@@ -22,6 +22,7 @@ from tussle.cli.tables import Row, estimate, indented, number_tables, title
 from tussle.cli.terminal import put, say_note
 from tussle.declare.displays import counted
 from tussle.errors import ParameterError, RecordError, listed, nearest_name
+from tussle.folders import real_path
 from tussle.record.run import Run, load_run
 from tussle.view.page.access import PageRole
 
@@ -143,7 +144,7 @@ def games_of(directories: Sequence[Path]) -> tuple[str, list[OperatedGame], list
                 f"{directory} is a batch, which is analyzed alone; the others are recorded runs"
             )
         for path in _runs_in(directory) or [directory]:
-            if seen.setdefault(path.resolve(), path) is not path:
+            if seen.setdefault(real_path(path), path) is not path:
                 raise ParameterError(f"{path} is given twice")
             run = _whole_run(path)
             mission = run.info["mission"]

@@ -330,7 +330,7 @@ def planned_by(options: RunOptions | ViewOptions) -> PlannedRun:
     text = options.from_batch or ""
     directory, colon, number = text.rpartition(":")
     for run, world in ((text, "0"), (directory, number)):
-        if run and world.isdigit() and (Path(run) / MISSION_FILE).exists():
+        if run and documents.is_count(world) and (Path(run) / MISSION_FILE).exists():
             return recorded_run(
                 Path(run),
                 int(world),
@@ -338,7 +338,7 @@ def planned_by(options: RunOptions | ViewOptions) -> PlannedRun:
                 allow_large=options.allow_large,
                 search=options.data_path,
             )
-    if not colon or not number.isdigit():
+    if not colon or not documents.is_count(number):
         raise ParameterError(
             f"--from {options.from_batch!r} is not allowed; it takes a batch directory and the number of a run, "
             "DIR:417, or a run directory"

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from tussle.api.bodies import BODY_UNITS, DERIVED, FLOATS, INTS, Bodies, derived_from, problems_of_states
+from tussle.api.kinds import row_shape
 from tussle.api.plugin import Plugin
 from tussle.declare.columns import Numbers, Param, State
 from tussle.engine.group import Binding, Group
@@ -50,10 +51,16 @@ def _columns(owner: Any) -> dict[str, Numbers]:
     return {k: c for k, c in owner.declared(Numbers).items() if k not in is_shared}
 
 
-def _located(state: SimulationState, path: str) -> tuple[Any, tuple[str, ...], str, Numbers]:
-    """Resolve a path. Returns the block or world plugin, the plugin path in the block, the column's name and its declaration."""
+def _located(state: SimulationState, path: str) -> tuple[Any, tuple[str, ...], str, Numbers, tuple[int, ...]]:
+    """Resolve a path.
+
+    Returns:
+        The block or world plugin, the plugin path in the block, the column's name, its declaration, and the shape of one row's value.
+    """
     owners, name = paths.resolve(path, paths.MissionRoot(state.mission), paths.inside, _columns)
-    return owners[0], tuple(p.instance_name for p in owners[1:]), name, _columns(owners[-1])[name]
+    owner, column = owners[-1], _columns(owners[-1])[name]
+    shape = column.shape if isinstance(owner, Block) or column.ragged else row_shape(owner, column)
+    return owners[0], tuple(p.instance_name for p in owners[1:]), name, column, shape
 
 
 def _body_column(bodies: Bodies, name: str, rows: np.ndarray) -> np.ndarray:
@@ -73,7 +80,7 @@ def capacity(state: SimulationState, number: int) -> int:
 
 def read(state: SimulationState, path: str) -> tuple[np.ndarray, np.ndarray]:
     """See `Simulation.read`."""
-    head, key, name, column = _located(state, path)
+    head, key, name, column, of_row = _located(state, path)
     if not isinstance(head, Block):
         values = np.moveaxis(_world_column(state, path, name), -1, 0).copy()
         return values, np.ones(len(values), bool)
@@ -82,7 +89,7 @@ def read(state: SimulationState, path: str) -> tuple[np.ndarray, np.ndarray]:
     alive = np.zeros(shape, bool)
     empty = None if column.ragged else MISSING[np.dtype(column.dtype).kind]
     out = np.full(
-        shape if column.ragged else (*shape, *column.shape), empty, object if column.ragged else column.dtype
+        shape if column.ragged else (*shape, *of_row), empty, object if column.ragged else column.dtype
     )
     for bodies, groups in _sources(state):
         for group, rows, held in groups:
@@ -132,7 +139,7 @@ def write(state: SimulationState, path: str, values: Any, world: int | None = No
     Returns:
         The values of all worlds, (n_worlds, capacity, ...); of a world plugin (n_worlds, ...).
     """
-    head, key, name, column = _located(state, path)
+    head, key, name, column, of_row = _located(state, path)
     if isinstance(values, str):
         try:
             values = column.read(values)
@@ -152,7 +159,7 @@ def write(state: SimulationState, path: str, values: Any, world: int | None = No
     if column.ragged:
         raise ParameterError(f"{path!r} is a list per entity; lists cannot be written")
     number, bodies = state.context.block_names.index(head.name), state.population.bodies
-    shape = (state.n_worlds, capacity(state, number), *column.shape)
+    shape = (state.n_worlds, capacity(state, number), *of_row)
     if world is None:
         new_values = _shaped(path, values, shape)
     else:

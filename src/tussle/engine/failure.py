@@ -15,8 +15,9 @@ from tussle.api.group import GroupView
 from tussle.api.world import WorldView
 from tussle.engine.group import Binding, Group
 from tussle.errors import PluginError, TussleError
+from tussle.folders import real_path
 
-_OWN = str(Path(__file__).resolve().parents[1])
+_OWN = str(real_path(Path(__file__)).parents[1])
 
 
 def _location(error: BaseException, plugin: Any) -> str:

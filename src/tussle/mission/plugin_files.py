@@ -25,6 +25,7 @@ from typing import Any
 
 from tussle.api.plugin import Plugin
 from tussle.errors import MissionError
+from tussle.folders import real_path
 from tussle.plugins import stock
 
 PREFIX = "tussle_plugins_"
@@ -64,7 +65,7 @@ class PluginFile:
             raise MissionError(f"{path}: there is no such plugin file")
         if file.suffix != ".py":
             raise MissionError(f"{path}: it is not a Python file (the name must end with .py)")
-        file = file.resolve()
+        file = real_path(file)
         return cls(
             str(file.parent), file.name, _with_imports(file.name, lambda name: _read(file.parent / name))
         )

@@ -12,6 +12,7 @@ from typing import Any
 from tussle.api.plugin import Plugin
 from tussle.declare.columns import Param
 from tussle.declare.texts import shown
+from tussle.documents import is_count
 from tussle.errors import MissionError, TussleError, listed
 from tussle.mission import codecs
 from tussle.mission.catalogue import KINDS, AbsentPluginError, Catalogue, historic
@@ -137,7 +138,7 @@ class PluginReader:
         if not (is_right and is_found):
             return None
         for each in cls.named_teams:
-            if str(values.get(each, "")).isdigit():
+            if is_count(str(values.get(each, ""))):
                 self.teams.append((written.where(each), f"{written.plugin}.{each}", int(values[each])))
         try:
             return cls(name=name, rate=rate, states=written.attributes.get("states"), **values)

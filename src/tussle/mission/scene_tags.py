@@ -9,6 +9,7 @@ from typing import Any
 
 from tussle.declare.texts import shown
 from tussle.errors import MissionError, TussleError
+from tussle.folders import real_path
 from tussle.mission import codecs
 from tussle.mission.data_files import DataFiles
 from tussle.mission.node import Node
@@ -205,7 +206,7 @@ class SceneReader:
         Raises:
             MissionError: It is not.
         """
-        if not any(path.resolve().is_relative_to(folder.resolve()) for folder in self.folders):
+        if not any(real_path(path).is_relative_to(real_path(folder)) for folder in self.folders):
             raise MissionError(f"{path}: only files in the mission's folder or below it are read")
 
 

@@ -12,6 +12,7 @@ from pathlib import Path
 from tussle.declare.texts import shown
 from tussle.documents import size_of
 from tussle.errors import MissionError, listed, nearest_name
+from tussle.folders import real_path
 from tussle.mission.node import Budget, Node, parse
 from tussle.mission.placeholders import replace_placeholders
 from tussle.mission.problems import Place, Problems
@@ -161,17 +162,17 @@ class SourceReader:
             MissionError: It cannot be read.
         """
         root, own_text = self._file(path, text)
-        roots = [path.parent.resolve(), *(s.resolve() for s in self.search)]
+        roots = [real_path(path.parent), *(real_path(s) for s in self.search)]
         if root.tag.startswith(XINCLUDE):
             raise MissionError(f"{root.place}: the root tag must be <runscript>, not an include")
         n_before = len(self.files)
-        self._include_all(root, [path.resolve()], roots)
+        self._include_all(root, [real_path(path)], roots)
         resolved = root.to_text() if len(self.files) > n_before else own_text
         return MissionSource(path, root, resolved, own_text, self.placeholders, self.places, self.files)
 
     def _file(self, path: Path, text: str | None = None) -> tuple[Node, str]:
         text = read_text(path, self.budget) if text is None else text
-        overrides = {"folder": str(path.parent.resolve()), **self.overrides}
+        overrides = {"folder": str(real_path(path.parent)), **self.overrides}
         replaced = replace_placeholders(text, str(path), overrides, self.problems, self.budget)
         for name, default in replaced.names.items():
             self.placeholders.setdefault(name, default)
@@ -236,7 +237,7 @@ class SourceReader:
             raise MissionError(f"{place}: an include needs href='FILE'")
         start = [including.parent, *self.search]
         try:
-            found = [p for p in ((s / base / href).resolve() for s in start) if _is_file(p)]
+            found = [p for p in (real_path(s / base / href) for s in start) if _is_file(p)]
         except (OSError, RuntimeError) as error:
             raise MissionError(f"{place}: {shown(href)} cannot be included: {error}") from None
         inside = [p for p in found if any(p.is_relative_to(root) for root in roots)]

@@ -297,7 +297,12 @@ def _code(value: Any, imports: dict[str, str]) -> list[str]:
         return [json.dumps(value, ensure_ascii=False)]
     if isinstance(value, (tuple, list)) and any(map(_is_made, value)):
         return ["[", *(f"    {line}" for each in value for line in _comma(_code(each, imports))), "]"]
+    if isinstance(value, dict) and value:
+        parts = [(f"{key!r}: ", _comma(_code(each, imports))) for key, each in value.items()]
+        return ["{", *(f"    {line}" for key, (first, *rest) in parts for line in (key + first, *rest)), "}"]
     if not _is_made(value):
+        if "inf" in re.findall(r"\w+", repr(value)):
+            imports["inf"] = "math"
         return [repr(value)]
     if isinstance(value, (HeightField, TriangleMesh)):
         raise MissionError(

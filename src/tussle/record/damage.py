@@ -8,6 +8,7 @@ from typing import Any
 
 from tussle.documents import DAMAGED
 from tussle.errors import RecordError
+from tussle.folders import real_path
 from tussle.record.arrow_blocks import InvalidStreamError, find_blocks
 from tussle.record.arrow_file import damage_of
 from tussle.record.run import run_directory
@@ -66,7 +67,7 @@ def file_damage(folder: Path, written: Mapping[str, str], document: str) -> list
     """What is damaged or missing of the files whose checksums a document lists."""
     damage = []
     for name, crc in written.items():
-        if not (folder / name).resolve().is_relative_to(folder.resolve()):
+        if not real_path(folder / name).is_relative_to(real_path(folder)):
             damage.append(f"{document} names a file outside of its directory")
             continue
         try:

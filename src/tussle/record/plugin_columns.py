@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
+from tussle.api.kinds import row_shape
 from tussle.api.plugin import Plugin
 from tussle.declare.columns import EntityRef, Numbers, Output, State
 from tussle.declare.displays import listing
@@ -151,8 +152,7 @@ def _plugins(owner: Block | Plugin, path: tuple[str, ...] = ()) -> Iterator[tupl
 
 def _components(plugin: Any, column: Numbers) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Names and units of the components of a column; those without a name are counted."""
-    sized = getattr(type(plugin), "state_size", None)  # world plugins have none
-    n = sized(plugin, column.name) if sized and isinstance(column, State) else len(column.fields)
+    n = sum(row_shape(plugin, column))
     fields = column.fields + tuple(str(i) for i in range(len(column.fields), n))
     return fields, column.units + ("",) * (len(fields) - len(column.fields))
 

@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from tussle.errors import MissionError, RecordError
+from tussle.folders import real_path
 from tussle.mission import PluginFile
 
 PLUGINS = "plugins"
@@ -33,10 +34,10 @@ def copied_plugins(directory: Path) -> tuple[PluginFile, ...]:
     found = sorted((int(match[1]), path / f"{match[2]}.py") for match, path in folders if match)
     try:
         files = tuple(PluginFile.of(path) for _, path in found)
-        home = directory.resolve() / PLUGINS
+        home = real_path(directory) / PLUGINS
         for (_, path), file in zip(found, files, strict=True):
             for name in (path.name, *file.texts):
-                if not (path.parent / name).resolve().is_relative_to(home):
+                if not real_path(path.parent / name).is_relative_to(home):
                     raise RecordError(
                         f"{path.parent / name} leads out of the run directory, so it is not read"
                     )

@@ -15,6 +15,7 @@ import pyarrow as pa
 
 from tussle.documents import POSITIVE, Maybe, check_argument
 from tussle.errors import MissionError, RecordError
+from tussle.folders import real_path
 from tussle.mission import PluginFile, to_xml
 from tussle.mission.write import with_seed
 from tussle.record import run_file
@@ -157,10 +158,10 @@ class Recorder:
                 raise RecordError(
                     f"{self.directory}: holds a run already ({held[0]}); choose another directory, or remove it"
                 )
-            home, copies = self.directory.resolve(), plugin_copies(plugin_files)
+            home, copies = real_path(self.directory), plugin_copies(plugin_files)
             inside = {
                 name: file for name, file in scene_files.items()
-                if (home / name).resolve().is_relative_to(home) and name not in FILES
+                if real_path(home / name).is_relative_to(home) and name not in FILES
             }  # fmt: skip
             for name in (*inside, *copies):
                 if (home / name).exists() and not (name in inside and inside[name].samefile(home / name)):

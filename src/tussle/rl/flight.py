@@ -13,6 +13,7 @@ import numpy as np
 from tussle.api import GroupView
 from tussle.documents import read_bytes
 from tussle.errors import MissingExtraError, ParameterError, listed, nearest_name
+from tussle.folders import real_path
 from tussle.numeric import rng
 from tussle.rl.action import Actor, Decoder, learned
 from tussle.rl.computed import Computed
@@ -105,11 +106,11 @@ class Policy:
             model = None
         if model is None or not model.graph.node:
             raise self._refused("it is not an ONNX file")
-        folder = path.parent.resolve()
+        folder = real_path(path.parent)
         for tensor in tensors_of(model.graph, self._refused):
             if tensor.data_location == onnx.TensorProto.EXTERNAL:
                 location = next((e.value for e in tensor.external_data if e.key == "location"), "")
-                other = (folder / location).resolve()
+                other = real_path(folder / location)
                 if not (
                     other.is_relative_to(folder) and other.is_file() and other.stat().st_size <= MAX_BYTES
                 ):

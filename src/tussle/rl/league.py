@@ -17,6 +17,7 @@ from tussle.batch.results import Results
 from tussle.batch.statistics import LEVEL, scipy_package
 from tussle.documents import several
 from tussle.errors import MissingExtraError, ParameterError, nearest_name
+from tussle.folders import real_path
 from tussle.mission import Mission
 from tussle.mission.plugin_files import load_plugin_file
 from tussle.rl.flight import Policy, load_flight, registered_task
@@ -196,7 +197,7 @@ class League:
                 f"player {text!r}{nearest_name(text, [RULES])}: there is no file {path}; "
                 "it takes rules, an ONNX file, NAME=rules or NAME=FILE"
             )
-        stem = path.resolve().parent.name if path.stem == "policy" else path.stem
+        stem = real_path(path).parent.name if path.stem == "policy" else path.stem
         made_for = Policy(str(path)).task or self.name
         tasks = [name for name, _ in self.sides]
         if made_for not in tasks:
@@ -207,7 +208,7 @@ class League:
         for side in sides:
             for block in self.sides[side][1].blocks:
                 load_flight(str(path), tasks[side], block.name)  # it fits
-        return [Contestant(name if equals else stem, str(path.resolve()), sides)]
+        return [Contestant(name if equals else stem, str(real_path(path)), sides)]
 
     def _pairs(self) -> list[tuple[str, str]]:
         """Names of those who play each other, of the learners' side first."""

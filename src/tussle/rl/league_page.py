@@ -16,6 +16,7 @@ from tussle.batch.report.formatting import count, number, percent
 from tussle.batch.report.sections import Plot, ReportTable, Section, numbers
 from tussle.batch.results import Results
 from tussle.errors import BatchError, RecordError
+from tussle.folders import real_path
 from tussle.palette import INK, TEAM_COLOURS
 from tussle.record import Recorder, load_run
 from tussle.rl.league import League, Pairing, Standings
@@ -98,7 +99,7 @@ def write_league_page(
     best = standings.ratings[0]
     return write_page(
         directory / PAGE, sections, pictures,
-        title=f"League of {standings.task}", version=tussle.__version__, source=f"the league {directory.resolve().name}",
+        title=f"League of {standings.task}", version=tussle.__version__, source=f"the league {real_path(directory).name}",
         answer=f"{best.name} leads {count(len(standings.ratings), 'player')} after {count(standings.n_games, 'game')}, with "
         f"{signed(best.elo)} Elo ({signed(best.low)} to {signed(best.high)}).",
         notes=[f"{count(standings.n_failed, 'game')} failed and count for nobody."] if standings.n_failed else [],

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tussle.api.bodies import FLOATS, OFFSETS
+from tussle.api.kinds import row_shape
 from tussle.documents import Whole, check_argument
 from tussle.errors import ParameterError, listed, nearest_name
 from tussle.numeric.kernel import kernel
@@ -202,12 +203,7 @@ def _column_of(block: Any, path: str) -> int:
     columns = {k: c for k, c in type(plugins[plugin]).declared(Numbers).items() if not c.ragged}
     if name not in columns:
         raise ParameterError(f"Own: {plugin} has no {name!r}{nearest_name(name, columns)}; {listed(columns)}")
-    return max(
-        1,
-        len(getattr(columns[name], "channels", ()))
-        if hasattr(columns[name], "channels")
-        else len(columns[name].fields),
-    )
+    return max(1, sum(row_shape(plugins[plugin], columns[name])))
 
 
 def _plugin_column(group: Group, path: str) -> tuple[np.ndarray, int, int, int]:

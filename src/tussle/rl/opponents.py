@@ -7,7 +7,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from tussle.documents import is_count
 from tussle.errors import ParameterError, listed
+from tussle.folders import real_path
 from tussle.mission import Mission
 from tussle.numeric import rng
 from tussle.plugins.stock import Learned
@@ -109,7 +111,7 @@ class Pool:
                 decoder, width = other.decoders[0], sum(other.widths[other.blocks[0].name])
                 n_out = len(decoder.free) if decoder.is_continuous else int(decoder.sizes.sum())
                 write_policy(file, [([[0.0] * width] * n_out, [0.0] * n_out)], task=name)
-        mission = with_policy(task.given, task.opponents, other, folder.resolve())
+        mission = with_policy(task.given, task.opponents, other, real_path(folder))
         self.task = task.replace(mission=mission, overrides={})
 
     def add(self, layers: Sequence[tuple[Any, Any]], n_updates: int) -> None:
@@ -137,7 +139,7 @@ def _slots(entry: str) -> list[tuple[str, Path | None]]:
     """
     given, equals, number = entry.strip().rpartition("=")
     given, number = (given, number) if equals else (number, "1")
-    if not number.isdecimal() or not 0 < len(number) <= 3 or not given:
+    if not is_count(number) or len(number) > 3 or not given:
         raise ParameterError(
             f"opponent {entry!r} is not allowed; it takes latest, past, or an ONNX file or folder, and after it =3 for three slots"
         )

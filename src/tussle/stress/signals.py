@@ -12,6 +12,7 @@ import numpy as np
 from tussle.api.bodies import Bodies
 from tussle.declare import units
 from tussle.declare.units import LENGTH, NONE, SPEED, TIME, Dimension
+from tussle.documents import is_count
 from tussle.engine.simulation import Simulation
 from tussle.errors import ParameterError, TussleError, listed, nearest_name
 from tussle.mission import Mission
@@ -48,7 +49,7 @@ class ChosenEntities:
             return cls("block", blocks.index(text))
         if text == "all":
             return cls("all")
-        if word in ("team", "entity") and rest.strip().isdecimal():
+        if word in ("team", "entity") and is_count(rest.strip()):
             number = int(rest)
             if word == "team" and number not in teams:
                 raise ParameterError(f"there is no team {number}; {listed(map(str, teams))}")

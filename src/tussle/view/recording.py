@@ -17,6 +17,7 @@ from tussle.api.draw import KINDS
 from tussle.batch.trust import DirectoryCode
 from tussle.documents import is_whole
 from tussle.errors import ParameterError, RecordError, TussleError, listed, nearest_name
+from tussle.folders import real_path
 from tussle.mission import Loaded, Mission, PluginFile, read_mission
 from tussle.record import Run, load_run
 from tussle.record.plugin_columns import PluginColumn
@@ -422,7 +423,7 @@ class Recording:
         stride = int(np.diff(self.steps, prepend=0).max())
         if stride > 1:
             self.notes.append(
-                f"{self.path.resolve().name} has states up to {stride * self.dt:g} s apart; specifications do not know what was between"
+                f"{real_path(self.path).name} has states up to {stride * self.dt:g} s apart; specifications do not know what was between"
             )
         self._add_events(self.alarms.events)
 
@@ -504,7 +505,7 @@ class Recording:
             return None
         try:
             loaded = read_mission(
-                path.resolve(),
+                real_path(path),
                 strict=False,
                 plugin_files=self._plugin_files or self._own_plugins(),
                 plays=False,
@@ -545,7 +546,7 @@ class Recording:
     @property
     def name(self) -> str:
         said = self.run.info.get("mission", {}).get("name")
-        return str(said) if said else self.path.resolve().name
+        return str(said) if said else real_path(self.path).name
 
     @cached_property
     def style(self) -> Style:

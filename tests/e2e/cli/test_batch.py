@@ -252,6 +252,7 @@ def test_a_run_that_comes_out_otherwise_is_told(here, folder):
     [
         ("out", "--from 'out' is not allowed; it takes a batch directory and the number of a run, DIR:417"),
         ("out:x", "--from 'out:x' is not allowed"),
+        ("out:²", "--from 'out:²' is not allowed"),
         ("out:3", "out: there is no run 3; the batch has runs 0 to 2"),
         ("nowhere:1", "nowhere: there is no such batch directory"),
     ],

@@ -50,6 +50,19 @@ BATCH = ("batch", *GAME, "--end", "2", *VARIED, "-n", "2")
 SEARCH = ("optimize", *GAME, "--end", "2", "--objective", "score[2]", *VARIED, "--trials", "4", "--per-round", "2", "-n", "2",
           "--sampler", "random")  # fmt: skip
 RUN = ("run", "predator_prey", "--set", "prey=6")
+STRESS = ("stress", "predator_prey", "--set", "prey=6", "--end", "2", "--processes", "1", "--spec")
+STUDY = (*STRESS, "always (distance(team 1, team 2) > 40 m)", "-n", "6")
+HUNT = (*STUDY, "--vary", "prey.Boids.max_speed=10:20", "--sampler", "random")
+SPLIT = (
+    *STRESS,
+    "always (distance(team 1, team 2) > 5 m)",
+    "--probability",
+    "--particles",
+    "4",
+    "--repetitions",
+    "2",
+)
+LEAGUE = ("league", "tussle/Battle-v0", "--players", "rules,b=rules", "--games", "2", "--processes", "1")
 
 
 class TooLong(BaseException):
@@ -118,6 +131,18 @@ def html(path: Path, out: Path) -> None:
 
 def mcap(path: Path, out: Path) -> None:
     write_mcap(Recording(path), out / "run.mcap")
+
+
+def bag(path: Path, out: Path) -> None:
+    cli("export", path, "--rosbag2", out / "bag")
+
+
+def earth(path: Path, out: Path) -> None:
+    cli("export", path, "--geojson", out / "a.geojson", "--kml", out / "a.kml", "--czml", out / "a.czml")
+
+
+def judged(path: Path, out: Path) -> None:
+    cli("export", path, "--html", out / "a.html", "--spec", "always (distance(team 1, team 2) > 1 m)")
 
 
 def plots(path: Path, out: Path) -> None:
@@ -197,6 +222,26 @@ def searched(path: Path, _: Path) -> None:
     cli(*SEARCH, "--out", path)
 
 
+def studied(path: Path, _: Path) -> None:
+    cli(*STUDY, "--out", path)
+
+
+def explained(path: Path, _: Path) -> None:
+    cli(*STUDY, "--why", "--out", path)
+
+
+def hunted(path: Path, _: Path) -> None:
+    cli(*HUNT, "--out", path)
+
+
+def split(path: Path, _: Path) -> None:
+    cli(*SPLIT, "--out", path)
+
+
+def rated(path: Path, _: Path) -> None:
+    cli(*LEAGUE, "--out", path)
+
+
 def wrong(path: Path, _: Path) -> None:
     """The commands of another kind of directory."""
     for command in (
@@ -214,19 +259,25 @@ Door = Callable[[Path, Path], None]
 DOORS: dict[str, tuple[tuple[Door, float], ...]] = {
     "run": ((run, 1), (recording, 1), (start, 0.5), (csv, 0.25), (parquet, 0.1), (html, 0.08), (mcap, 0.08),
     (replayed, 0.03), (viewed, 0.01),
-            (started, 0.05), (plots, 0.005)),
+            (started, 0.05), (plots, 0.005), (bag, 0.03), (earth, 0.03), (judged, 0.03)),
     "batch": ((batch, 1), (again, 0.25), (resumed, 0.04), (analyzed, 0.05), (reported, 0.03), (played_again, 0.03), (logged, 0.03)),
     "cut": ((batch, 1), (again, 0.25), (resumed, 0.04), (analyzed, 0.02)),
     "search": ((search, 1), (searched, 0.06)),
+    "study": ((studied, 1), (explained, 0.05)),
+    "hunt": ((hunted, 1),),
+    "split": ((split, 1),),
+    "league": ((rated, 1),),
 }  # fmt: skip
 """Ways to read each kind of directory, and how often each is tried."""
+OFTEN = ("run", "batch", "cut", "search")
+"""Kinds that are tried five times as often as the others, which play games."""
 
 
 # -- what is damaged ----------------------------------------------------------------------------------------------------------------
 
 
 def make(root: Path) -> None:
-    """A directory of each kind: a run of two worlds, a batch, one that was stopped, and a search."""
+    """A directory of each kind: a run of two worlds, a batch, one that was stopped, a search, studies of stress, and a league."""
     loaded = read_mission("predator_prey", {"prey": "6", "run.end": "3"})
     with Simulation(loaded.mission, seeds=[1, 2]) as simulation:
         with Recorder(simulation, root / "run", mission_text=loaded.text) as recorder:
@@ -237,7 +288,14 @@ def make(root: Path) -> None:
         Batch("predator_prey", vary=VARIED[1::2], runs=2, settings={"prey": 6, "run.end": "2.0"}, ends_by_time=True, strict=False,
               allow_large=False).play(root / "cut", InProcess(2), on_progress=_stop)  # fmt: skip
     assert list((root / "cut" / "parts").iterdir())
-    cli(*SEARCH, "--out", root / "search")
+    for words, name in (
+        (SEARCH, "search"),
+        (STUDY, "study"),
+        (HUNT, "hunt"),
+        (SPLIT, "split"),
+        (LEAGUE, "league"),
+    ):
+        cli(*words, "--out", root / name)
     make_bombs(root, root / "bombs")
 
 
@@ -300,6 +358,7 @@ def main(sources: Path, work: Path, first: int, last: int) -> None:
     if not sources.exists():
         make(sources)
     kinds = sorted(DOORS)
+    turns = [*OFTEN * 4, *kinds]
     for kind in kinds:  # what a door loads and compiles is not its directory's fault
         for door, _ in DOORS[kind]:
             copied, out = work / "warm", work / "out"
@@ -314,7 +373,7 @@ def main(sources: Path, work: Path, first: int, last: int) -> None:
     for number in range(first, last):
         if n_faults > MAX_FAULTS:
             break
-        kind = kinds[number % len(kinds)]
+        kind = turns[number % len(turns)]
         rng = random.Random(number)
         path, out = work / f"{kind}{number}", work / "out"
         said = damage(rng, sources / kind, path)

@@ -1,6 +1,6 @@
-"""Run, batch and search directories that were damaged somehow: each is read or refused in one message, with bounded time and memory.
+"""Directories of runs, batches, searches, studies and leagues, damaged somehow: each is read or refused in one message, in bounded time.
 
-TUSSLE_DAMAGES sets how many are tried; by default two thousand, in a minute of CPU time.
+TUSSLE_DAMAGES sets how many are tried; by default two thousand, in two minutes of CPU time.
 """
 
 from __future__ import annotations

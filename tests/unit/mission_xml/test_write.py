@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from collections.abc import Iterator
 from contextlib import suppress
@@ -18,8 +19,17 @@ from tussle.api import Interaction
 from tussle.errors import MissionError, TussleError
 from tussle.mission import Loaded, read_mission, shipped_missions, to_python, to_xml
 from tussle.mission.effects import exactly
-from tussle.scene import Base, Scene, Sphere
-from tussle.stock import Boids, MotorSchemas, MoveToGoalMS, SimpleCollision, SphereNetwork, Still
+from tussle.plugins import stock
+from tussle.scene import Base, Cuboid, FlatGround, Origin, Plane, Polyhedron, Prism, Scene, Sphere
+from tussle.stock import (
+    Boids,
+    MotorSchemas,
+    MoveToGoalMS,
+    RandomAttrit,
+    SimpleCollision,
+    SphereNetwork,
+    Still,
+)
 
 OWN = [sys.modules[name].__file__ for name in ("random_missions", "golden_plugins")]
 
@@ -35,7 +45,11 @@ def written_and_read(mission: Mission, folder: Path, seed: int | None = None, **
     return read_mission(folder / "m.xml", strict=True, **more)
 
 
-@pytest.mark.parametrize("name", sorted(shipped_missions()))
+EXAMPLES = {path: name for name, path in stock.examples().items() if "JSBSim" not in name}
+"""An example, and a plugin that has it; those of JSBSim need the package."""
+
+
+@pytest.mark.parametrize("name", [*sorted(shipped_missions()), *EXAMPLES.values()])
 def test_shipped_missions_are_read_back_equal(name, tmp_path):
     loaded = read_mission(name)
     again = written_and_read(loaded.mission, tmp_path, 2**64 - 1)
@@ -85,6 +99,30 @@ def test_what_only_a_file_or_only_python_can_leave_out_is_kept(tmp_path):
 
 def a(**values):
     return Block(**{"name": "a", "motion": Still()} | values)
+
+
+CORNERS = ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+SHAPES = (
+    Plane((0, 0, 0), (0, 0, 1)),
+    Cuboid(rpy=(0, 0, 1)),
+    Sphere(),
+    Polyhedron(CORNERS),
+    Prism(((0, 0), (1, 0), (0, 1))),
+)
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        {"scene": Scene(walls=SHAPES)},
+        {"scene": Scene(boundaries=dict(enumerate(SHAPES)) | {"home": FlatGround(2.0)})},
+        {"scene": Scene(origin=Origin(1.0, 2.0, 3.0), ground=FlatGround(), bases=(Base(2, (0, 0, 0)),))},
+        {"interactions": [RandomAttrit(start_after=math.inf)], "name": 'a "name"\\'},
+    ],
+)
+def test_code_names_all_that_it_needs(values):
+    mission = Mission(blocks=[a(name="ä")], **values)
+    assert exactly(built(to_python(mission))) == exactly(mission)
 
 
 class Collision:

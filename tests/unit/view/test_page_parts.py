@@ -51,6 +51,7 @@ def test_the_missions_camera_is_where_one_begins():
         ({"focal_point": "a b c"}, "camera focal_point 'a b c' is not x, y, z"),
         ({"mode": "fly"}, "camera mode 'fly' is none of free, follow, offset"),
         ({"follow_id": "all"}, "camera follow_id 'all' is no id"),
+        ({"follow_id": "²"}, "camera follow_id '²' is no id"),
     ],
 )
 def test_a_camera_that_makes_no_sense_is_told_and_left_out(said, told):

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from tussle.documents import several
 from tussle.errors import MissingExtraError, RecordError
-from tussle.folders import whole_file
+from tussle.folders import real_path, whole_file
 
 if TYPE_CHECKING:
     from tussle.batch.report.answers import ShortAnswer
@@ -78,7 +78,7 @@ def write_report(
     page = write_page(
         Path(directory) / INDEX, sections, pictures,
         title=str(results.info.get("name") or "A batch of games"), version=str(results.info.get("tussle", "")),
-        source="a batch in memory" if results.path is None else f"the batch {results.path.resolve().name}",
+        source="a batch in memory" if results.path is None else f"the batch {real_path(results.path).name}",
         answer=" ".join([*sentences, answer(data)]), answers=asked, notes=notes(data),
     )  # fmt: skip
     missing = "".join(sorted({letter for picture in pictures.values() for letter in picture.missing}))

@@ -19,6 +19,7 @@ from tussle.batch.selection import written
 from tussle.batch.statistics import sign_test
 from tussle.batch.target import Answers
 from tussle.batch.variables import Range
+from tussle.folders import real_path
 
 MAX_ASKED = 2
 """Numbers and choices that are asked for by name, each."""
@@ -336,4 +337,4 @@ def _extreme_game(data: ReportData, lead: Measure) -> tuple[str, str]:
     text = f"The least {data.title(lead.expression)}, {number(values[least])}, is that of run {run} (seed {seed}{where})."
     if results.path is None or (results.info.get("mission") or {}).get("made_in") == "python":
         return text, ""
-    return text, f"tussle run --from {shlex.quote(f'{results.path.resolve().name}:{run}')}"
+    return text, f"tussle run --from {shlex.quote(f'{real_path(results.path).name}:{run}')}"

@@ -28,6 +28,7 @@ from tussle.batch.report.formatting import (
 from tussle.batch.report.report_data import Measure, ReportData
 from tussle.batch.selection import written
 from tussle.batch.variables import Range
+from tussle.folders import real_path
 from tussle.palette import PAPER, mixed
 from tussle.record.event_texts import END_TEXTS, end_text
 
@@ -339,7 +340,7 @@ def notable_runs(data: ReportData) -> Section:
     """Section with failed games and those that took longest, and the commands that play them again."""
     results = data.results
     is_file = (results.info.get("mission") or {}).get("made_in") != "python"
-    folder = results.path.resolve().name if results.path is not None and is_file else None
+    folder = real_path(results.path).name if results.path is not None and is_file else None
 
     def table(
         title: str,

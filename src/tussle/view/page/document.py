@@ -9,6 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 
 import tussle
+from tussle.documents import is_count
 from tussle.mission import Mission
 from tussle.view.frame import Event
 from tussle.view.page.packing import ints
@@ -121,9 +122,9 @@ def opening_data(said: Mapping[str, Any] | None, notes: list[str]) -> dict[str, 
     if mode is None:
         notes.append(f"camera mode {said['mode']!r} is none of free, follow, offset; it is free")
     follow = str(said.get("follow_id", ""))
-    if follow and not follow.isdigit():
+    if follow and not is_count(follow):
         notes.append(f"camera follow_id {follow!r} is no id; nobody is followed")
-    who = int(follow) if follow.isdigit() else 0
+    who = int(follow) if is_count(follow) else 0
     return {"position": position, "target": target, "mode": mode or "free", "follow": who}
 
 

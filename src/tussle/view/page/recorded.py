@@ -12,8 +12,9 @@ from typing import Any
 import numpy as np
 
 from tussle.declare import displays
-from tussle.documents import POSITIVE, Maybe, check_argument
+from tussle.documents import POSITIVE, Maybe, check_argument, is_count
 from tussle.errors import ViewError
+from tussle.folders import real_path
 from tussle.mission import Mission
 from tussle.view.page.chunks import ANGLE_ERROR, FULL_HEALTH, UNIT, pack, position_error, step_of
 from tussle.view.page.compare import Comparison
@@ -190,7 +191,7 @@ class RecordedData:
             "columns": self._n_column_blobs,
             "shapes": self._n_shape_blobs,
         }.get(kind, 0)
-        if not number.isdecimal() or len(number) > 9 or int(number) >= n_blobs:
+        if not is_count(number) or int(number) >= n_blobs:
             return None
         if kind == "shapes":
             return self._shapes(int(number) * SHAPE_FRAMES)
@@ -228,7 +229,7 @@ class RecordedData:
 
     def _column(self, who: str, column: str) -> bytes | None:
         """Changes of a column of an entity, in each run that has it."""
-        if not who.isdecimal() or len(who) > 9 or column not in self._quantities:
+        if not is_count(who) or column not in self._quantities:
             return None
         runs = [run for run in self._runs if column in quantities_of(run[0])]
         changes = [column_changes(run, int(who), column, id_shift) for run, _, id_shift in runs]
@@ -306,7 +307,7 @@ def comparison_data(game: Comparison) -> list[dict[str, Any]]:
     return [
         {
             "name": name,
-            "title": run.path.resolve().name,
+            "title": real_path(run.path).name,
             "teams": [team + shift for team in run.teams],
             "teamShift": shift,
         }
@@ -328,7 +329,7 @@ def game_facts(game: Recording | Comparison) -> list[tuple[str, str]]:
     info, t = game.run.info, game.t
     names = {str(team): name for team, name in game.teams.items()}
     worlds = info.get("worlds", [])
-    facts = [("Run", game.path.resolve().name)]
+    facts = [("Run", real_path(game.path).name)]
     if game.world < len(worlds):
         world = worlds[game.world]
         facts.append(("Seed", str(world["seed"])))

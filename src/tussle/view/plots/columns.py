@@ -11,6 +11,7 @@ import numpy as np
 
 from tussle.batch.report.drawing import rule_y
 from tussle.errors import ParameterError, ViewError, listed, nearest_name
+from tussle.folders import real_path
 from tussle.palette import INK
 from tussle.palette import TEAM_COLOURS as COLOURS
 from tussle.record.schema import FLOAT_COLUMNS
@@ -152,7 +153,7 @@ def _run_lines(
     for i, tracks in enumerate(games):
         for j, values in enumerate(means.values()):
             axes.plot(t, values[i], color=COLOURS[i], linestyle=DASHES[j % len(DASHES)], linewidth=1.2)
-        yield line_sign(COLOURS[i]), f"{tracks.recording.path.resolve().name}"
+        yield line_sign(COLOURS[i]), f"{real_path(tracks.recording.path).name}"
     if len(means) > 1:
         for j, team in enumerate(means):
             yield line_sign(INK, linestyle=DASHES[j % len(DASHES)]), teams[team]

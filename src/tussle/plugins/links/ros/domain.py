@@ -9,6 +9,7 @@ import threading
 from pathlib import Path
 from typing import Any
 
+from tussle.documents import is_count
 from tussle.errors import RosError
 
 LAST_DOMAIN, FIRST_PORT, N_PORTS = 232, 7400, 250
@@ -30,7 +31,7 @@ def domain_id() -> int:
         RosError: It is no number of a domain.
     """
     text = os.environ.get("ROS_DOMAIN_ID") or "0"
-    if not (text.isascii() and text.isdigit() and int(text) <= LAST_DOMAIN):
+    if not (is_count(text) and int(text) <= LAST_DOMAIN):
         raise RosError(
             f"ROS_DOMAIN_ID = {text!r} is not allowed; it takes a whole number from 0 to {LAST_DOMAIN}"
         )
