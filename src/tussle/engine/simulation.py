@@ -312,7 +312,8 @@ class Simulation:
             **fields: Fields of the message; one value, or one per world along the last axis.
 
         Raises:
-            ParameterError: A world or a field does not exist, or an entity of `receivers` does not, or it does not subscribe to the topic.
+            ParameterError: A world, a field or an entity that one names does not exist, nor an entity of `receivers`, or it does not
+                subscribe to the topic.
             WiringError: The network does not exist, or the topic has another message type.
         """
         running, message_bus = self.state.running, self.state.message_bus
@@ -324,10 +325,7 @@ class Simulation:
         batch = Messages.make(type_, chosen, np.zeros(len(chosen), np.int64), fields)
         buffer = message_bus.topic(network, topic or type_.__name__, type_, "publish")
         sent = batch.take(np.flatnonzero(running[chosen]))
-        if ids:
-            order(self.state, buffer, sent, ids)
-        else:
-            buffer.add(sent)
+        order(self.state, buffer, sent, ids)
         for number, world in enumerate(sent.world.tolist()) if self._is_told else ():
             self._tell(world, of_message(sent, number, self._step_of(world), network, topic, ids))
 
