@@ -9,6 +9,7 @@ from typing import Any
 
 import pyarrow.compute as pc
 
+from tussle.arguments import explained
 from tussle.batch import store
 from tussle.batch.points import settings_of
 from tussle.batch.results import Results
@@ -24,6 +25,7 @@ OWN_OPTIONS = ("strict", "compat")
 """Options of `read_mission` that `batch.json` may set."""
 
 
+@explained
 def load_batch(path: str | Path) -> Results:
     """Read the results of a batch directory, complete or not.
 

@@ -56,7 +56,7 @@ class TaskParallelEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]  # Pett
     def action_space(self, agent: str) -> Any:
         return self._of(agent, self.action_spaces)
 
-    def _of(self, agent: str, by_name: Mapping[str, Any]) -> Any:
+    def _of(self, agent: Any, by_name: Mapping[str, Any]) -> Any:
         """The value of an agent.
 
         Raises:
