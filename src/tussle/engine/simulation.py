@@ -106,7 +106,8 @@ class Simulation:
             self.reset(range(self.n_worlds))
             _ = self.schedule.calls
             check_stiffness(self.state)
-            for text in self.state.message_bus.network_mismatches():
+            absent = () if mission.is_from_file else mission.absent_teams()
+            for text in (*self.state.message_bus.network_mismatches(), *absent):
                 warnings.warn(text, RuntimeWarning, stacklevel=2)
         except Exception:
             self.close()
