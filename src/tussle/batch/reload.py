@@ -46,6 +46,7 @@ class PlannedRun:
         state_hash: State hash of the run there; "" where it is not finished.
         origin: What it comes from: "batch" or "recording".
         inputs: What came from outside into a recorded run.
+        interrupted: Why a recording is not complete; "" where it is, or nobody knows.
     """
 
     loaded: Loaded
@@ -54,6 +55,7 @@ class PlannedRun:
     state_hash: str
     origin: str = "batch"
     inputs: tuple[ExternalInput, ...] = ()
+    interrupted: str = ""
 
 
 def recorded_run(
@@ -104,7 +106,8 @@ def recorded_run(
     recorded = worlds[world]
     is_over = info["is_complete"] and recorded.get("state_hash")
     state_hash = recorded["state_hash"] if is_over else ""
-    return PlannedRun(loaded, mission, recorded["seed"], state_hash, "recording", load_inputs(path, world))
+    inputs, interrupted = load_inputs(path, world), info.get("interrupted", "")
+    return PlannedRun(loaded, mission, recorded["seed"], state_hash, "recording", inputs, interrupted)
 
 
 def _not_known(code: DirectoryCode) -> str:
