@@ -66,14 +66,21 @@ def check_kind(name: str, value: Any, kind: Any, error: type[TussleError] = Para
 def explained(function: Decorated) -> Decorated:
     """A function whose Python errors name the argument that is of another type than its annotation, and say what it takes.
 
-    The types are looked at where a call has failed; a call that succeeds costs nothing more. A class stands for its public methods. An
-    `__init__`, which is that of a declaration, raises a `DeclarationError`.
+    The types are looked at where a call has failed; a call that succeeds costs nothing more. A class stands for its public methods and
+    its making. An `__init__` alone, which is that of a declaration, raises a `DeclarationError`.
     """
     if isinstance(function, type):
         for name, each in vars(function).copy().items():
-            if inspect.isfunction(each) and not name.startswith("_"):
-                setattr(function, name, explained(each))
+            inner = each.__func__ if isinstance(each, staticmethod | classmethod) else each
+            if inspect.isfunction(inner) and (name == "__init__" or not name.startswith("_")):
+                checked = _explained(inner, ParameterError)
+                setattr(function, name, checked if inner is each else type(each)(checked))
         return function
+    return _explained(function, DeclarationError if function.__name__ == "__init__" else ParameterError)
+
+
+def _explained(function: Decorated, error: type[TussleError]) -> Decorated:
+    """One function of `explained`."""
 
     @functools.wraps(function)
     def call(*args: Any, **kwargs: Any) -> Any:
@@ -81,7 +88,7 @@ def explained(function: Decorated) -> Decorated:
             return function(*args, **kwargs)
         except PYTHON_ERRORS as reason:
             is_python = not isinstance(reason, TussleError) or hasattr(reason, "is_of_inner_call")
-            if is_python and (better := _better(function, args, kwargs)):
+            if is_python and (better := _better(function, args, kwargs, error)):
                 better.is_of_inner_call = True  # type: ignore[attr-defined]
                 raise better from None
             raise
@@ -89,13 +96,13 @@ def explained(function: Decorated) -> Decorated:
     return call  # type: ignore[return-value]
 
 
-def _better(function: Callable[..., Any], args: Any, kwargs: Any) -> TussleError | None:
+def _better(
+    function: Callable[..., Any], args: Any, kwargs: Any, error: type[TussleError]
+) -> TussleError | None:
     """A better error, if an argument explains why a call failed."""
-    is_declared = function.__name__ == "__init__"
-    error: type[TussleError] = DeclarationError if is_declared else ParameterError
-    name = type(args[0]).__name__ if is_declared else function.__name__
+    name = type(args[0]).__name__ if function.__name__ == "__init__" else function.__name__
     signature = inspect.signature(function)
-    known = [each for each in signature.parameters if each != "self"]
+    known = [each for each in signature.parameters if each not in ("self", "cls")]
     try:
         given = signature.bind(*args, **kwargs).arguments
     except TypeError as wrong:
@@ -143,7 +150,8 @@ def _is_of(value: Any, kind: Any) -> bool:
     kind = origin or kind
     if kind is np.ndarray:
         return hasattr(value, "__array__") or isinstance(value, numbers.Number | list | tuple)
-    return kind is Any or not isinstance(kind, type) or isinstance(value, kind)
+    is_checked = isinstance(kind, type) and not getattr(kind, "_is_protocol", False)
+    return kind is Any or not is_checked or isinstance(value, kind)
 
 
 def _noun(kind: Any) -> str:

@@ -22,6 +22,10 @@ class ParameterError(TussleError, ValueError):
     """A parameter is unknown, has the wrong type, or is out of bounds."""
 
 
+class PortError(ParameterError):
+    """A port of this machine cannot be opened: another program has it, or the address is not this machine's."""
+
+
 class UnitError(ParameterError):
     """A value has an unknown unit, or a unit of another quantity."""
 

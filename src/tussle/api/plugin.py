@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from copy import copy
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar, Self, TypeVar
@@ -201,6 +202,16 @@ class Plugin:
 
     def check_values(self) -> None:
         """Check parameters that must fit together, as data; a hook that raises `ParameterError` if they do not."""
+
+    def check_values_with(self, values: dict[str, Any]) -> None:
+        """Check other values of parameters, each of which is allowed alone, as data.
+
+        Raises:
+            ParameterError: They do not fit together, or not to the parameters that stay.
+        """
+        other = copy(self)
+        other.__dict__["_values"] = self.values | values
+        other.check_values()
 
     def check_order(self, low: str, high: str) -> None:
         """Check that a parameter is not larger than another one; to be called by `check_values` of plugins with lower and upper limits.

@@ -15,6 +15,7 @@ from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from tussle.arguments import explained
 from tussle.batch.design_points import (
     DesignPoint,
     build_points,
@@ -64,6 +65,7 @@ MAX_SEEDS, MAX_RUNS_UNTIL = 100_000, 1_000_000
 """Seeds and runs of a batch with `until` and without `runs`."""
 
 
+@explained
 class Batch:
     """One mission, played with many seeds and values.
 

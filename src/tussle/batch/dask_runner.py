@@ -12,6 +12,7 @@ from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass, field
 from typing import Any
 
+from tussle.arguments import explained
 from tussle.batch.dask_worker import code_of, play_chunk
 from tussle.batch.executors import RunQueue, even_size
 from tussle.batch.stack import stack_size
@@ -63,6 +64,7 @@ def connect(address: str, timeout: float = 10.0) -> Iterator[Client]:
         yield client
 
 
+@explained
 class OnDask:
     """Plays on the workers of a Dask cluster, one stack at a time on each: start them with one thread.
 

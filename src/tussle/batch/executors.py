@@ -14,6 +14,7 @@ from functools import partial
 from types import ModuleType
 from typing import TYPE_CHECKING, Protocol
 
+from tussle.arguments import explained
 from tussle.batch.stack import HEARTBEAT_PERIOD, play, stack_size
 from tussle.batch.tasks import BatchRun, Finished, Heartbeat, Package
 from tussle.documents import Maybe, Whole, check_argument
@@ -68,6 +69,7 @@ def even_size(size: int, n_runs: int, n_workers: int) -> int:
     return max(1, -(-n_runs // (rounds * n_workers)))
 
 
+@explained
 class InProcess:
     """Plays in this process; in another one where runs have a time limit, or where the process that played a batch before was killed.
 
@@ -91,6 +93,7 @@ class InProcess:
             yield from play(mission, partial(queue.take, group), size, package.watcher())
 
 
+@explained
 class Processes:
     """Plays in several processes of this machine.
 

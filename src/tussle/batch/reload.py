@@ -9,6 +9,7 @@ from typing import Any
 
 import pyarrow.compute as pc
 
+from tussle.arguments import explained
 from tussle.batch import store
 from tussle.batch.points import settings_of
 from tussle.batch.results import Results
@@ -25,6 +26,7 @@ OWN_OPTIONS = ("strict", "compat")
 """Options of `read_mission` that `batch.json` may set."""
 
 
+@explained
 def load_batch(path: str | Path) -> Results:
     """Read the results of a batch directory, complete or not.
 
@@ -45,6 +47,7 @@ class PlannedRun:
         state_hash: State hash of the run there; "" where it is not finished.
         origin: What it comes from: "batch" or "recording".
         inputs: What came from outside into a recorded run.
+        interrupted: Why a recording is not complete; "" where it is, or nobody knows.
     """
 
     loaded: Loaded
@@ -53,6 +56,7 @@ class PlannedRun:
     state_hash: str
     origin: str = "batch"
     inputs: tuple[ExternalInput, ...] = ()
+    interrupted: str = ""
 
 
 def recorded_run(
@@ -103,7 +107,8 @@ def recorded_run(
     recorded = worlds[world]
     is_over = info["is_complete"] and recorded.get("state_hash")
     state_hash = recorded["state_hash"] if is_over else ""
-    return PlannedRun(loaded, mission, recorded["seed"], state_hash, "recording", load_inputs(path, world))
+    inputs, interrupted = load_inputs(path, world), info.get("interrupted", "")
+    return PlannedRun(loaded, mission, recorded["seed"], state_hash, "recording", inputs, interrupted)
 
 
 def _not_known(code: DirectoryCode) -> str:

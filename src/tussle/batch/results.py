@@ -6,7 +6,7 @@ import math
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +14,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
+from tussle.arguments import explained
 from tussle.batch import run_table
 from tussle.batch.default_quantities import (
     COUNTED,
@@ -51,6 +52,7 @@ if TYPE_CHECKING:
     from tussle.batch.store import StoredBatch
 
 
+@explained
 class Results:
     """Results of the runs of a batch; of an unfinished batch, those of its finished runs.
 
@@ -470,13 +472,9 @@ class Results:
             ParameterError: There is no such quantity.
             MissingExtraError: The points were sampled for indices that take a package which is not there.
         """
-        return effects(
-            self.variables,
-            self.points,
-            self.by_seed(expression),
-            self._step,
-            lambda: self._fit(expression, is_share=False),
-        )
+        values = self.by_seed(expression)
+        fit = partial(self._fit, expression, is_share=False)
+        return effects(self.variables, self.points, values, self._step, fit)
 
     def response(self, expression: str) -> Response:
         """A smooth fit of a quantity over all that varies, with its band.

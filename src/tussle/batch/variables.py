@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from tussle.arguments import explained
 from tussle.declare.units import MAX_TEXT, QUANTITY, unit_of
 from tussle.errors import ParameterError, UnitError, clipped, nearest_name
 from tussle.mission.codecs import written
@@ -36,6 +37,7 @@ SHOWN_DIGITS = 12
 """Significant digits of a range's width in its values: enough to tell any two apart, few enough to be typed."""
 
 
+@explained
 @dataclass(frozen=True)
 class Range:
     """Numbers between two bounds, both included.
@@ -168,6 +170,7 @@ class Range:
         return min(SHOWN_DIGITS + max(leading, 0), 17)
 
 
+@explained
 @dataclass(frozen=True)
 class Choice:
     """One of several values.

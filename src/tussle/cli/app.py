@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import sys
 from typing import Annotated
 
 import typer
@@ -67,4 +69,7 @@ for name, (options, target) in COMMANDS.items():
 
 def start() -> None:
     """Run the command line."""
+    if sys.argv[1:2] in (["--show-completion"], ["--install-completion"]) and len(sys.argv) > 2:
+        # Without this, Typer takes the shell that it runs in, whatever is named.
+        os.environ["_TYPER_COMPLETE_TEST_DISABLE_SHELL_DETECTION"] = "1"
     run_guarded(lambda: app(prog_name="tussle"))

@@ -250,10 +250,13 @@ def run(options: RunOptions) -> int:
         show_summary(simulation, name, speed, recorder.directory if recorder else None)
         if planned is not None and simulation.is_over and options.start_from is None:
             check_hash(planned, simulation.state_hash(), str(options.from_batch))
-            known = f"the end is that of the {planned.origin}: the same state hash"
-            say_note(
-                f"run {options.from_batch}: {known if planned.state_hash else f'the {planned.origin} has not played it to its end'}"
+            why = f": {planned.interrupted}" if planned.interrupted else ""
+            known = (
+                f"the end is that of the {planned.origin}: the same state hash"
+                if planned.state_hash
+                else f"the {planned.origin} has not played it to its end{why}"
             )
+            say_note(f"run {options.from_batch}: {known}")
     if error is not None:
         raise error
     if interrupt.code:

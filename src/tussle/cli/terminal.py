@@ -16,7 +16,7 @@ from rich.console import Console, ConsoleOptions, RenderableType
 from rich.segment import Segment
 from rich.text import Text
 
-from tussle.errors import BatchError, PluginError, RecordError, TussleError, visible
+from tussle.errors import BatchError, PluginError, PortError, RecordError, TussleError, visible
 
 WIDEST = 100
 """Largest width of tables and bars, in characters."""
@@ -135,7 +135,7 @@ def code_of(error: BaseException) -> int:
     """Return the exit code of an error."""
     if isinstance(error, KeyboardInterrupt):
         return INTERRUPTED
-    if isinstance(error, PluginError):
+    if isinstance(error, PluginError) and not isinstance(error.cause, PortError):
         return PLUGIN_FAILED
     if isinstance(error, (BatchError, RecordError, OSError)):
         return NOT_WRITTEN

@@ -8,6 +8,7 @@ import numpy as np
 
 from tussle.api.bodies import problems_of_states
 from tussle.api.links import Links
+from tussle.declare.columns import EntityRef
 from tussle.declare.comms import EVERYONE, SAME_ENTITY, TopicBuffer
 from tussle.declare.messages import ManualControl, Messages, RemoveEntity, SpawnEntity
 from tussle.engine import failure
@@ -48,17 +49,7 @@ def deliver(state: SimulationState) -> None:
 def _request_births(state: SimulationState, batch: Messages) -> None:
     """Turn `SpawnEntity` messages into spawn requests for the next step, block by block in the order of the mission."""
     view = state.world_view
-    has_attitude = (batch.quat != 0.0).any(axis=0)
-    numbers = {name: k for k, name in enumerate(view.templates)}
-    number = np.array([numbers.get(str(block), -1) for block in batch.block], np.int64)
-    problems: dict[int, str] = {}
-    for i in np.flatnonzero(number < 0).tolist():
-        block = batch.block[i]
-        problems[i] = f"there is no block {block!r}{nearest_name(str(block), numbers)}; {listed(numbers)}"
-    for name in ("pos", "vel", "quat"):
-        for i, text in problems_of_states(name, getattr(batch, name)):
-            if name != "quat" or has_attitude[i]:
-                problems.setdefault(i, text)
+    number, has_attitude, problems = _read_births(state, batch)
     number[list(problems)] = -1
     for k, with_attitude in sorted(set(zip(number.tolist(), has_attitude.tolist(), strict=True))):
         index = np.flatnonzero((number == k) & (has_attitude == with_attitude))
@@ -70,6 +61,22 @@ def _request_births(state: SimulationState, batch: Messages) -> None:
         if not state.failed[world := int(batch.world[i])]:
             sender = f"sent by entity {int(batch.sender[i])}"
             state.record_failure(world, state.error(world, f"SpawnEntity: {text}", where=sender))
+
+
+def _read_births(state: SimulationState, batch: Messages) -> tuple[np.ndarray, np.ndarray, dict[int, str]]:
+    """Number of the template and whether there is an attitude, (n,) each, of `SpawnEntity` messages, and what is wrong with which."""
+    has_attitude = (batch.quat != 0.0).any(axis=0)
+    numbers = {name: k for k, name in enumerate(state.world_view.templates)}
+    number = np.array([numbers.get(str(block), -1) for block in batch.block], np.int64)
+    problems: dict[int, str] = {}
+    for i in np.flatnonzero(number < 0).tolist():
+        block = batch.block[i]
+        problems[i] = f"there is no block {block!r}{nearest_name(str(block), numbers)}; {listed(numbers)}"
+    for name in ("pos", "vel", "quat"):
+        for i, text in problems_of_states(name, getattr(batch, name)):
+            if name != "quat" or has_attitude[i]:
+                problems.setdefault(i, text)
+    return number, has_attitude, problems
 
 
 def _request_deaths(state: SimulationState, batch: Messages) -> None:
@@ -184,17 +191,36 @@ def _count_links(
     state.events.links(network.spec.instance_name, bodies.id, links, subscribes)
 
 
-def order(state: SimulationState, topic: TopicBuffer, batch: Messages, ids: tuple[int, ...]) -> None:
-    """Queue messages from outside for some entities of their worlds, which receive them at the end of the step that comes.
+def order(
+    state: SimulationState, topic: TopicBuffer, batch: Messages, ids: tuple[int, ...], *, is_repeated: bool
+) -> None:
+    """Publish messages from outside, or queue them for some entities of their worlds, which receive them at the end of the step that comes.
 
     Raises:
-        ParameterError: An entity does not exist in a world, or does not subscribe to the topic.
+        ParameterError: As `check_order`; for those that are repeated, as `check_receivers`.
     """
-    number, receiver = check_order(state, topic, batch, ids)
-    topic.post(batch, (number, receiver), state.context.clock.step[batch.world])
+    number, receiver = (check_receivers if is_repeated else check_order)(state, topic, batch, ids)
+    if ids:
+        topic.post(batch, (number, receiver), state.context.clock.step[batch.world])
+    else:
+        topic.add(batch)
 
 
 def check_order(
+    state: SimulationState, topic: TopicBuffer, batch: Messages, ids: tuple[int, ...]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return message number and id of the receiver of each copy, (m,), of messages to some entities.
+
+    Raises:
+        ParameterError: As `check_receivers`; a field names an entity that never was, or a new entity cannot be as it is asked for.
+    """
+    _check_references(state, batch)
+    if batch.type is SpawnEntity and (problems := _read_births(state, batch)[2]):
+        raise ParameterError(f"SpawnEntity: {problems[min(problems)]}")
+    return check_receivers(state, topic, batch, ids)
+
+
+def check_receivers(
     state: SimulationState, topic: TopicBuffer, batch: Messages, ids: tuple[int, ...]
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return message number and id of the receiver of each copy, (m,), of messages to some entities.
@@ -219,6 +245,23 @@ def check_order(
                 f"{nearest_name(f'{topic.network}/{topic.name}', heard)}; {listed(heard)}"
             )
     return number, receiver
+
+
+def _check_references(state: SimulationState, batch: Messages) -> None:
+    """Check the ids in messages from outside. An entity that has died is no error, since the sender cannot know it yet.
+
+    Raises:
+        ParameterError: No entity of the world has had an id; or it is 0, nobody, in a request to the engine.
+    """
+    n_ids = state.births.next_id[batch.world] - 1
+    least = int(batch.type in (RemoveEntity, ManualControl))
+    for name in (name for name, column in batch.type.fields.items() if isinstance(column, EntityRef)):
+        ids = batch.data[name]
+        for i in np.flatnonzero((ids < least) | (ids > n_ids))[:1]:
+            raise ParameterError(
+                f"{batch.type.__name__}: {name} = {ids[i]} is not allowed; no entity of world {batch.world[i]} has had this id; "
+                f"ids are {least} to {n_ids[i]}{'' if least else ', and 0 is nobody'}"
+            )
 
 
 def _steps(delay: np.ndarray, dt: float) -> np.ndarray:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -13,6 +13,9 @@ from tussle.declare.columns import Param
 from tussle.errors import ParameterError
 from tussle.mission import Block, Mission, paths
 from tussle.mission.spec import WORLD_VALUES
+
+Key: TypeAlias = tuple[str, tuple[str, ...], str]
+"""Owner, plugin path and parameter."""
 
 
 class Overrides:
@@ -26,9 +29,9 @@ class Overrides:
     def __init__(self, mission: Mission, n_worlds: int) -> None:
         self.mission = mission
         self.n_worlds = n_worlds
-        self.columns: dict[tuple[str, tuple[str, ...], str], np.ndarray] = {}
-        self.given: dict[tuple[str, tuple[str, ...], str], np.ndarray] = {}
-        self.structural: dict[tuple[str, tuple[str, ...], str], list[Any]] = {}
+        self.columns: dict[Key, np.ndarray] = {}
+        self.given: dict[Key, np.ndarray] = {}
+        self.structural: dict[Key, list[Any]] = {}
         self._block_values: dict[tuple[str, tuple[str, ...]], np.ndarray] = {}
         self._variants: dict[tuple[Any, ...], tuple[Block, ...]] = {}
 
@@ -36,10 +39,11 @@ class Overrides:
         """Set parameters of `worlds`; each value is one for all worlds, or one per world along its first axis.
 
         Raises:
-            ParameterError: A path does not exist, or a value is not allowed.
+            ParameterError: A path does not exist, or a value is not allowed, alone or with the other parameters of its plugin.
         """
-        for path, items in self.checked(values, len(worlds)).items():
-            key, column = self._find(path)
+        found = [(*self._find(path), items) for path, items in self.checked(values, len(worlds)).items()]
+        self._check_together(found, worlds)
+        for key, column, _, items in found:
             if column.structural:
                 row = self.structural.setdefault(key, [None] * self.n_worlds)
                 for w, item in zip(worlds, items, strict=True):
@@ -59,7 +63,7 @@ class Overrides:
         """
         found = {}
         for path, value in values.items():
-            _, column = self._find(path)
+            _, column, _ = self._find(path)
             is_many = isinstance(value, (list, np.ndarray)) and _depth(value) > len(column.shape)
             if is_many and len(value) != n_worlds:
                 raise ParameterError(
@@ -84,7 +88,28 @@ class Overrides:
         """Restore the values that `save` returned."""
         self.columns, self.given, self.structural = copy.deepcopy(saved)
 
-    def _find(self, path: str) -> tuple[tuple[str, tuple[str, ...], str], Param]:
+    def _check_together(self, found: Sequence[tuple[Key, Param, Any, list[Any]]], worlds: np.ndarray) -> None:
+        """Check values that plugins compare, such as lower and upper limits, with what the worlds have already; nothing is set."""
+        plugins: dict[tuple[str, tuple[str, ...]], Plugin] = {
+            key[:2]: owner
+            for key, _, owner, _ in found
+            if isinstance(owner, Plugin) and type(owner).check_values is not Plugin.check_values
+        }
+        for place, plugin in plugins.items():
+            kept = [key for key in self.columns if key[:2] == place]
+            seen: set[tuple[Any, ...]] = set()
+            for i, world in enumerate(worlds.tolist()):
+                values = {key[2]: _item(self.columns[key][world]) for key in kept if self.given[key][world]}
+                values |= {key[2]: items[i] for key, _, _, items in found if key[:2] == place}
+                if (one := tuple(values.items())) not in seen:
+                    seen.add(one)
+                    try:
+                        plugin.check_values_with(values)
+                    except ParameterError as error:
+                        raise ParameterError(f"world {world}: {place[0]!r}: {error}") from None
+
+    def _find(self, path: str) -> tuple[Key, Param, Any]:
+        """Return the key of a path, its declaration, and its block or plugin."""
         owners, name = paths.resolve(path, paths.MissionRoot(self.mission), paths.inside, paths.settable)
         column, names = paths.declared(owners[-1], name), path.split(".")
         if isinstance(owners[0], Block):
@@ -94,7 +119,7 @@ class Overrides:
             is_own = is_own and column is not None and not column.structural
         if column is None or column.ragged or not is_own:
             raise ParameterError(f"{path!r} is the same in all worlds of a stack; set it in the mission")
-        return (names[0], plugins, name), column
+        return (names[0], plugins, name), column, owners[-1]
 
     def block_values(self, block: Block, names: Sequence[str], world: np.ndarray) -> np.ndarray:
         """Values of a block for entities of the worlds `world`, (k, m), or (k, 1) if all are equal."""
@@ -129,6 +154,12 @@ class Overrides:
                 mission = paths.with_value(mission, ".".join((owner, *plugins, name)), value)
             self._variants[key] = tuple(mission.blocks)
         return self._variants[key]
+
+
+def _item(value: Any) -> Any:
+    """A value of a column as plugins keep it."""
+    item = value.tolist()
+    return tuple(item) if isinstance(item, list) else item
 
 
 def _depth(value: Any) -> int:

@@ -106,7 +106,8 @@ class Simulation:
             self.reset(range(self.n_worlds))
             _ = self.schedule.calls
             check_stiffness(self.state)
-            for text in self.state.message_bus.network_mismatches():
+            absent = () if mission.is_from_file else mission.absent_teams()
+            for text in (*self.state.message_bus.network_mismatches(), *absent):
                 warnings.warn(text, RuntimeWarning, stacklevel=2)
         except Exception:
             self.close()
@@ -312,9 +313,24 @@ class Simulation:
             **fields: Fields of the message; one value, or one per world along the last axis.
 
         Raises:
-            ParameterError: A world or a field does not exist, or an entity of `receivers` does not, or it does not subscribe to the topic.
+            ParameterError: A world, a field or an entity that one names does not exist, nor an entity of `receivers`, or it does not
+                subscribe to the topic.
             WiringError: The network does not exist, or the topic has another message type.
         """
+        self._publish(type_, worlds, network, topic, receivers, fields)
+
+    def _publish(
+        self,
+        type_: type[Message],
+        worlds: Iterable[int] | None,
+        network: str,
+        topic: str,
+        receivers: Iterable[int],
+        fields: dict[str, Any],
+        *,
+        is_repeated: bool = False,
+    ) -> None:
+        """Publish as `publish`; the ids in the fields of a message that is repeated are not checked."""
         running, message_bus = self.state.running, self.state.message_bus
         if worlds is None:
             chosen = np.flatnonzero(running)
@@ -324,10 +340,7 @@ class Simulation:
         batch = Messages.make(type_, chosen, np.zeros(len(chosen), np.int64), fields)
         buffer = message_bus.topic(network, topic or type_.__name__, type_, "publish")
         sent = batch.take(np.flatnonzero(running[chosen]))
-        if ids:
-            order(self.state, buffer, sent, ids)
-        else:
-            buffer.add(sent)
+        order(self.state, buffer, sent, ids, is_repeated=is_repeated)
         for number, world in enumerate(sent.world.tolist()) if self._is_told else ():
             self._tell(world, of_message(sent, number, self._step_of(world), network, topic, ids))
 
@@ -393,7 +406,7 @@ class Simulation:
                 return
             type_ = self.state.message_bus.type_of(given.network, given.topic or given.name, given.name)
             fields, to = fields_of(type_, given.values), given.to
-            self.publish(type_, [world], network=given.network, topic=given.topic, receivers=to, **fields)
+            self._publish(type_, [world], given.network, given.topic, to, fields, is_repeated=True)
 
     def _play_inputs(self) -> None:
         for world, by_step in self._inputs.items():

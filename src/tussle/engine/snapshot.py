@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import pickle
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,10 +15,14 @@ from tussle.engine.group import Binding, Group
 from tussle.engine.manual import manual_columns
 from tussle.engine.rows import rows_changed
 from tussle.engine.state import SimulationState
-from tussle.errors import SnapshotError
+from tussle.errors import SnapshotError, clipped
+from tussle.mission import Mission
+from tussle.mission.paths import values_of
 from tussle.record import hash_columns
 
 HASHED = ("id", "team", "block", "pos", "vel", "quat", "omega", "force", "torque", "health", "radius", "mass")
+
+MAX_DIFFERENCES = 3
 
 
 @dataclass
@@ -87,7 +91,7 @@ def restore(state: SimulationState, saved: Snapshot) -> None:
     if saved.mission != state.mission or len(saved.seeds) != state.n_worlds:
         raise SnapshotError(
             f"the snapshot has {len(saved.seeds)} worlds of mission {saved.mission.name!r}, the simulation {state.n_worlds} of mission "
-            f"{state.mission.name!r}; numbers of worlds and missions must be equal"
+            f"{state.mission.name!r}; numbers of worlds and missions must be equal{_differences(saved.mission, state.mission)}"
         )
     population, births, world = state.population, state.births, saved.world
     if not set(saved.groups) <= {g.key for g in population.groups}:
@@ -124,6 +128,24 @@ def restore(state: SimulationState, saved: Snapshot) -> None:
     for world_binding, columns in zip(state.world_bindings, world["world_plugins"], strict=True):
         world_binding.restore(columns)
     state.message_bus.restore(world["messages"])
+
+
+def _differences(saved: Mission, own: Mission) -> str:
+    """What differs between two missions: "; in the snapshot, prey.count = 9 (here 10)"; "" where nothing does."""
+    there, here = values_of(saved), values_of(own)
+    both = there.keys() & here.keys()
+    texts = [
+        f"{path} = {_shown(there, path)} (here {_shown(here, path)})"
+        for path in dict.fromkeys([*there, *here])
+        if path.rpartition(".")[0] in ("", *both) and (path not in both or there[path] != here[path])
+    ]
+    more = f", and {len(texts) - MAX_DIFFERENCES} more" if len(texts) > MAX_DIFFERENCES else ""
+    return f"; in the snapshot, {', '.join(texts[:MAX_DIFFERENCES])}{more}" if texts else ""
+
+
+def _shown(values: Mapping[str, Any], path: str) -> str:
+    value = values.get(path, "absent")
+    return value.__name__ if isinstance(value, type) else clipped(repr(value)) if path in values else value
 
 
 def _no_rows(group: Group, first: int) -> tuple[Any, ...]:

@@ -100,6 +100,25 @@ def declared(owner: Any, name: str) -> Param | None:
     return (MISSION_VALUES if isinstance(owner, Mission) else BLOCK_VALUES).get(name)
 
 
+def values_of(mission: Mission) -> dict[str, Any]:
+    """Every value of a mission by its path, such as "prey.Boids.gain"; of a plugin its class."""
+    found: dict[str, Any] = {}
+
+    def walk(path: tuple[str, ...], owner: Any) -> None:
+        for name in settable(owner):
+            value = owner.values.get(name) if isinstance(owner, Plugin) else getattr(owner, name)
+            if not any(
+                isinstance(each, Plugin | Block) for each in (value if isinstance(value, tuple) else (value,))
+            ):
+                found[".".join([*path, name])] = value
+        for name, member in inside(owner).items():
+            found[".".join([*path, name])] = type(member)
+            walk((*path, name), member)
+
+    walk((), MissionRoot(mission))
+    return found
+
+
 def with_value(mission: Mission, path: str, value: Any) -> Mission:
     """Return a copy of a mission with one value changed: a number is SI, a text is read as in a mission file.
 

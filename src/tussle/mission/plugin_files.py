@@ -24,7 +24,7 @@ from types import ModuleType
 from typing import Any
 
 from tussle.api.plugin import Plugin
-from tussle.errors import MissionError
+from tussle.errors import MissionError, listed
 from tussle.folders import real_path
 from tussle.plugins import stock
 
@@ -61,6 +61,11 @@ class PluginFile:
             MissionError: It does not exist, cannot be read, or is not a Python file.
         """
         file = Path(path).expanduser()
+        if file.is_dir():
+            inside = sorted(each.name for each in file.glob("*.py"))
+            raise MissionError(
+                f"{path}: it is a folder; a plugin file is one Python file; in the folder {listed(inside)}"
+            )
         if not file.is_file():
             raise MissionError(f"{path}: there is no such plugin file")
         if file.suffix != ".py":

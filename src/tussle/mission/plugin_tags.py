@@ -12,12 +12,12 @@ from typing import Any
 from tussle.api.plugin import Plugin
 from tussle.declare.columns import Param
 from tussle.declare.texts import shown
-from tussle.documents import is_count
 from tussle.errors import MissionError, TussleError, listed
 from tussle.mission import codecs
 from tussle.mission.catalogue import KINDS, AbsentPluginError, Catalogue, historic
 from tussle.mission.node import Budget, Node
 from tussle.mission.problems import Place, Problems
+from tussle.mission.spec import teams_named
 from tussle.mission.tags import PLUGIN
 
 MAX_NESTED = 4
@@ -137,14 +137,14 @@ class PluginReader:
                 self.problems.note(written.where(""), text)
         if not (is_right and is_found):
             return None
-        for each in cls.named_teams:
-            if is_count(str(values.get(each, ""))):
-                self.teams.append((written.where(each), f"{written.plugin}.{each}", int(values[each])))
         try:
-            return cls(name=name, rate=rate, states=written.attributes.get("states"), **values)
+            plugin = cls(name=name, rate=rate, states=written.attributes.get("states"), **values)
         except TussleError as error:
             self.problems.error(written.where(""), str(error))
             return None
+        for each, team in teams_named(plugin).items():
+            self.teams.append((written.where(each), f"{written.plugin}.{each}", team))
+        return plugin
 
     def faster(self, plugin: Plugin | None, written: PluginTag, is_moving: bool) -> Plugin | None:
         """Return the plugin that stands in for that of a tag, if there is one; it has its name. `is_moving` as of `Plugin.stand_in`."""
@@ -219,7 +219,7 @@ class PluginReader:
     def report_teams(self, known: Iterable[int]) -> None:
         """Report the teams that tags name and no block has."""
         for place, parameter, team in self.teams:
-            if team > 0 and team not in known:
+            if team not in known:
                 text = f"{parameter} = {team}: no <entity> has this team; {listed(map(str, sorted(known)))}"
                 self.problems.note(place, text)
 

@@ -6,15 +6,16 @@ import dataclasses
 import functools
 import inspect
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, TypeVar
+from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 
-from tussle.api import Autonomy, Controller, Interaction, Metric, MotionModel, Network, Sensor
+from tussle.api import Autonomy, Controller, Interaction, Metric, MotionModel, Network, Plugin, Sensor
 from tussle.api.context import missing_service
 from tussle.declare.columns import Param
+from tussle.documents import is_count
 from tussle.errors import MissionError, ParameterError, TussleError, listed, nearest_name
 from tussle.mission import displayed
 from tussle.mission.cadence import Cadence
@@ -98,6 +99,12 @@ def _plugins(where: str, value: Any, kind: type) -> tuple[Any, ...]:
                 f"{where}: two plugins are called {name!r}; give one of them another name with name=..."
             )
     return plugins
+
+
+def teams_named(plugin: Plugin) -> dict[str, int]:
+    """Return the parameters of a plugin that were given and name a team, with its number: 0 and below are nobody or all."""
+    given = {name: str(plugin.stated.get(name, "")) for name in plugin.named_teams}
+    return {name: int(text) for name, text in given.items() if is_count(text) and int(text)}
 
 
 def _refuse_rate(where: str, plugin: Any, why: str) -> None:
@@ -324,6 +331,7 @@ class Mission:
     reseed: int | None = None
     rekeys: Any = ()
     limits: Limits = field(default=Limits(), repr=False)  # no effect on the game
+    is_from_file: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         if not isinstance(self.blocks, Iterable):
@@ -422,6 +430,16 @@ class Mission:
         of_blocks = dict(zip([block.name for block in self.blocks], names, strict=True))
         return of_blocks, [p.instance_name for p in self.world_plugins]
 
+    def absent_teams(self) -> Iterator[str]:
+        """Yield a note for each parameter that names a team which no block has."""
+        owners = [*((f"block {b.name!r}", b.plugins) for b in self.blocks), ("mission", self.world_plugins)]
+        for where, outer in owners:
+            for plugin in (each for one in outer for each in one.walk()):
+                for name, team in teams_named(plugin).items():
+                    if team not in self.teams:
+                        known = listed(map(str, self.teams.tolist()))
+                        yield f"{where}: {plugin.instance_name}.{name} = {team}: no block has this team; {known}"
+
     @property
     def steps(self) -> int:
         """Number of steps until the end time, rounded to the nearest integer."""
@@ -444,7 +462,7 @@ class Mission:
     def replace(self, **changes: Any) -> Mission:
         """Return a copy with changed values."""
         _check_names("Mission", Mission, changes)
-        return dataclasses.replace(self, **changes)
+        return read_from_file(dataclasses.replace(self, **changes), self.is_from_file)
 
     def ending_by_time(self) -> Mission:
         """Return a copy with the end condition "time" in addition to its own."""
@@ -456,6 +474,12 @@ class Mission:
 
     def _repr_html_(self) -> str:
         return displayed.mission_html(self)
+
+
+def read_from_file(mission: Mission, is_from_file: bool = True) -> Mission:
+    """Keep with a mission whether a file said it, whose notes have its lines; returns the mission."""
+    _set(mission, "is_from_file", is_from_file)
+    return mission
 
 
 MISSION_VALUES = _declared(

@@ -27,7 +27,7 @@ from tussle.mission.problems import Place, Problems
 from tussle.mission.rekeys import parse_rekeys
 from tussle.mission.scene_tags import SCENE_TAGS, SceneReader
 from tussle.mission.source import MissionSource, SourceReader, find_mission
-from tussle.mission.spec import MISSION_VALUES, Mission, end_conditions
+from tussle.mission.spec import MISSION_VALUES, Mission, end_conditions, read_from_file
 from tussle.mission.stray_tags import report_stray
 from tussle.mission.strictness import strictness_of
 from tussle.mission.tags import RUN, RUNSCRIPT, SEED_ATTRIBUTES, WORLD, TagSpec
@@ -257,14 +257,16 @@ class _WorldReader:
         name = root.attributes.get("name", "").strip()
         settings: dict[str, Any] = {**times, **world, **reseed}
         try:
-            mission = Mission(
-                blocks=[block for block in blocks if block is not None],
-                end_conditions=conditions,
-                scene=Scene(origin=origin, bases=tuple(entities.bases), **parts),
-                name=name,
-                compat=root.attributes.get("compat", ""),
-                limits=self.limits,
-                **settings,
+            mission = read_from_file(
+                Mission(
+                    blocks=[block for block in blocks if block is not None],
+                    end_conditions=conditions,
+                    scene=Scene(origin=origin, bases=tuple(entities.bases), **parts),
+                    name=name,
+                    compat=root.attributes.get("compat", ""),
+                    limits=self.limits,
+                    **settings,
+                )
             )
         except TussleError as error:
             raise MissionError(f"{root.place}: {error}") from error

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from pettingzoo import ParallelEnv
 
+from tussle.declare.displays import listing
 from tussle.errors import ParameterError, nearest_name
 from tussle.rl.action import array_of
 from tussle.rl.environments import Pictures, check_options, in_parts, metadata_of, reset_one, told_of_one
@@ -50,10 +51,23 @@ class TaskParallelEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]  # Pett
         self._pictures = Pictures(swarm, render_mode)
 
     def observation_space(self, agent: str) -> Any:
-        return self.observation_spaces[agent]
+        return self._of(agent, self.observation_spaces)
 
     def action_space(self, agent: str) -> Any:
-        return self.action_spaces[agent]
+        return self._of(agent, self.action_spaces)
+
+    def _of(self, agent: Any, by_name: Mapping[str, Any]) -> Any:
+        """The value of an agent.
+
+        Raises:
+            ParameterError: There is no such agent.
+        """
+        if not isinstance(agent, str) or agent not in by_name:
+            near = nearest_name(str(agent), by_name)
+            raise ParameterError(
+                f"{agent!r:.80} is no agent{near}; there are: {listing(self.possible_agents)}"
+            )
+        return by_name[agent]
 
     def _observed(self, agents: list[str], numbers: Any) -> dict[str, np.ndarray]:
         obs = self.swarm.obs[0][numbers]

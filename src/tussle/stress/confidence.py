@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from xml.etree import ElementTree as ET
 
+from tussle.arguments import explained
 from tussle.batch.statistics import scipy_package
 from tussle.stress.estimates import Probability, Sample
 from tussle.stress.importance import ImportanceEstimate
@@ -13,6 +14,7 @@ from tussle.stress.importance import ImportanceEstimate
 CONFIDENCE = 0.95
 
 
+@explained
 @dataclass(frozen=True)
 class Assurance:
     """The probability above which a specification holds, with 95 % confidence.

@@ -8,6 +8,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
+from tussle.arguments import explained
 from tussle.batch.statistics import scipy_package
 from tussle.batch.variables import SHOWN_DIGITS, Value, Variable, parse_bounds
 from tussle.errors import ParameterError, clipped, listed, nearest_name
@@ -19,6 +20,7 @@ LAWS = {"normal": "mean, sd", "lognormal": "median, sd of the logarithm", "unifo
 CALL = re.compile(r"\s*(\w{1,40})\s*\(([^(),]{1,100}),([^(),]{1,100})\)\s*")
 
 
+@explained
 @dataclass(frozen=True)
 class Distribution:
     """The distribution of a value of a mission.

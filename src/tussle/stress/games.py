@@ -12,6 +12,7 @@ from functools import reduce
 from pathlib import Path
 from typing import Any, Self
 
+from tussle.arguments import explained
 from tussle.batch import by_value
 from tussle.batch.batch import Batch
 from tussle.batch.design_points import group_points
@@ -41,6 +42,7 @@ WORTH_PROCESSES = 4.0
 """CPU time of a round [s] below which processes would take longer to start than they save."""
 
 
+@explained
 @dataclass(frozen=True)
 class StressGame:
     """One game of a study: what it takes to play it again, beside the mission and its values.

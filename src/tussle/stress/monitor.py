@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from tussle.api.bodies import Bodies
+from tussle.arguments import explained
 from tussle.engine.simulation import Simulation
 from tussle.mission import Mission
 from tussle.stress.formulas import guided, records
@@ -20,6 +21,7 @@ ROOM = 256
 """Samples for which there is room at first."""
 
 
+@explained
 @dataclass(frozen=True)
 class Verdict:
     """How far a game was from breaking its specification.
@@ -50,6 +52,7 @@ class Verdict:
         return self.steps[below] if below < len(self.steps) else None
 
 
+@explained
 class Monitor:
     """Reads the signals of a specification at the start of each step and at the end of each world of a simulation.
 

@@ -15,6 +15,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from tussle.arguments import explained
 from tussle.batch.points import settings_of
 from tussle.batch.search.proposals import Proposer, require_optuna
 from tussle.batch.search.trials import Trial, value_of
@@ -67,6 +68,7 @@ class Tried:
         return self.played.verdict.has_failed and (self.other is None or not self.other.verdict.has_failed)
 
 
+@explained
 @dataclass
 class FailureSearch:
     """What a search found.

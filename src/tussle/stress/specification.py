@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from tussle.arguments import explained
 from tussle.batch.quantities import column_name
 from tussle.batch.stack import metrics_of
 from tussle.declare.units import COMPOUND_EXAMPLES, UNITS, unit_of
@@ -24,6 +25,7 @@ from tussle.stress.terms import AtEnd, OfStep, SignalTerm
 Function = Callable[[Simulation], Any]
 
 
+@explained
 @dataclass(frozen=True)
 class Specification:
     """What must hold in each game of a mission.

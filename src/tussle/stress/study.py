@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from tussle.arguments import explained
 from tussle.batch import by_value
 from tussle.batch.batch import Batch
 from tussle.batch.design_points import check_variables, with_whole_numbers
@@ -50,6 +51,7 @@ MAX_MADE = 4096
 """Missions of games with values that are kept."""
 
 
+@explained
 class Stress:
     """A mission and a specification that its games must keep.
 

@@ -7,9 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from tussle.api.bodies import FLOATS, OFFSETS
+from tussle.arguments import explained
 from tussle.engine.simulation import Simulation
 
 
+@explained
 @dataclass(frozen=True, eq=False)
 class Frame:
     """All entities of one world at one time; the arrays are not changed.
@@ -121,6 +123,7 @@ def _closed(array: np.ndarray) -> np.ndarray:
     return array
 
 
+@explained
 def frame_of(simulation: Simulation, world: int = 0) -> Frame:
     """A copy of the present state of a world; of one that has ended, its last state."""
     return FrameReader(simulation, world).frame()

@@ -10,6 +10,7 @@ from typing import Any, Self
 
 import numpy as np
 
+from tussle.arguments import explained
 from tussle.documents import Real, check_argument
 from tussle.errors import ParameterError, listed, nearest_name
 from tussle.numeric.rng import stream_key, uniform
@@ -19,6 +20,7 @@ LOSS = stream_key("operator", "link", "loss")
 RULES = {"delay": Real(0.0, 1e6), "loss": Real(0.0, 1.0), "bandwidth": Real(1e-3), "see": Real(0.0, 600.0)}
 
 
+@explained
 @dataclass(frozen=True)
 class OperatorLink:
     """How orders come from people to the game: later, one after the other, or not at all; and how late people see the game.

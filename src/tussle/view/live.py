@@ -11,6 +11,7 @@ from typing import Any, Self
 
 import numpy as np
 
+from tussle.arguments import explained
 from tussle.declare.messages import CustomKeyPress, Message, RemoveEntity, WorldPointClicked
 from tussle.documents import POSITIVE, check_argument, is_whole
 from tussle.engine.result import WorldResult
@@ -47,6 +48,7 @@ FORGET_TIME = 10.0
 """Time after the last request at which the state of an entity is dropped [s]."""
 
 
+@explained
 class Live:
     """Controls a simulation and observes it while it plays.
 

@@ -14,6 +14,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from tussle.api.draw import KINDS
+from tussle.arguments import explained
 from tussle.batch.trust import DirectoryCode
 from tussle.documents import is_whole
 from tussle.errors import ParameterError, RecordError, TussleError, listed, nearest_name
@@ -46,6 +47,7 @@ def masked(column: pa.ChunkedArray) -> np.ma.MaskedArray[Any, Any]:
     )
 
 
+@explained
 class Recording:
     """One world of a run directory, complete or not.
 

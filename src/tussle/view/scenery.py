@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from tussle.arguments import explained
 from tussle.errors import TussleError
 from tussle.mission import Block, GivenMission, Mission, mission_of
 from tussle.view.ground_map.map_file import GroundMap
@@ -99,6 +100,7 @@ class Scenery:
         return float(np.linalg.norm(self.high - self.low))
 
 
+@explained
 def scenery_of(
     mission: GivenMission | None,
     viewer: Mapping[str, Any] | None = None,

@@ -8,7 +8,10 @@ from functools import cache
 
 import numpy as np
 
+from tussle.arguments import explained
 
+
+@explained
 @dataclass(frozen=True, eq=False)
 class Mesh:
     """A closed surface of triangles.

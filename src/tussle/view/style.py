@@ -7,6 +7,7 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from tussle.arguments import explained
 from tussle.palette import colour_in, colour_of, rgb_of, team_colours
 from tussle.view.shapes import MODELS
 from tussle.view.sight import Sight
@@ -38,6 +39,7 @@ _MOTION_WORDS: Mapping[str, tuple[str, ...]] = {
 """Words in the names of motion models."""
 
 
+@explained
 class Style:
     """Colours and models of a mission's entities.
 

@@ -45,6 +45,18 @@ def offered(tmp_path_factory):
     return ask
 
 
+@pytest.mark.parametrize(
+    ("shell", "mark"),
+    [("bash", "complete -o default"), ("zsh", "#compdef tussle"), ("fish", "complete --command tussle")],
+)
+def test_the_shell_that_is_named_is_the_one_that_is_shown(process, shell, mark):
+    assert mark in process("--show-completion", shell).stdout
+
+
+def test_a_shell_that_has_no_completion_is_refused(process):
+    assert "'tcsh' is not one of 'bash', 'zsh', 'fish'" in process("--show-completion", "tcsh", code=2).stderr
+
+
 def test_bash_completes_missions_and_plugins(offered):
     assert offered("run", "predator_") == ["predator_prey", "predator_prey_jsbsim", "predator_prey_paper"]
     assert offered("run", "Single") == [

@@ -12,6 +12,7 @@ from tussle import Recorder, Simulation, load_run
 from tussle.cli.app import app
 from tussle.mission import read_mission
 from tussle.record import load_inputs
+from tussle.view import Live
 
 PLUGIN = '''
 from tussle.api import EasyAutonomy, Field, Handle, Message, Output, Param, Subscribe
@@ -87,6 +88,24 @@ def test_a_run_is_played_again_with_them(called):
     assert code != 0
     assert "inputs.arrow" in text
     assert "the game cannot be played again as it was" in " ".join(text.split())
+
+
+def test_why_a_recording_is_not_whole_is_said_where_it_is_played_again(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    loaded = read_mission("predator_prey", {"run.end": 2.0})
+    with Simulation(loaded.mission, 1) as sim, Live(sim, threaded=False) as live:
+        recorder = Recorder(sim, "run", mission_text=loaded.text)
+        live.step(8)
+        live.step_back(4)
+        live.remove([1])
+        live.step()
+        recorder.close()
+    why = "the game was rewound or restarted, and took another course"
+    assert load_run("run").info["interrupted"] == why
+    for command in (("analyze", "run"), ("run", "--from", "run", "--no-log")):
+        code, text = tussle(*command)
+        assert code == 0, text
+        assert why in " ".join(text.split())
 
 
 def test_a_flipped_bit_is_found(called):

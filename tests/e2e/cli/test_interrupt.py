@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import signal
 import subprocess
+import sys
 import time
 
 import pytest
@@ -98,3 +99,20 @@ def test_before_the_game_nothing_was_played(folder):
     assert process.returncode == 130
     assert err == "interrupted: nothing was played\n"
     assert not (folder / "out").exists()
+
+
+def test_ctrl_c_while_the_commands_are_imported_ends_quietly():
+    program = """
+import os, signal, sys
+import tussle.cli
+
+class Interrupts:
+    def find_spec(self, name, *_):
+        if name == "tussle.cli.app":
+            os.kill(os.getpid(), signal.SIGINT)
+
+sys.meta_path.insert(0, Interrupts())
+tussle.cli.main()
+"""
+    done = subprocess.run([sys.executable, "-c", program], check=False, capture_output=True, text=True)
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "")

@@ -270,6 +270,7 @@ def test_a_plugin_that_fails_ends_the_game_and_what_was_played_is_kept(tussle, f
         (["run", "game.xml", "--end", "-3"], 1, "--end -3 is not allowed"),
         (["run", "game.xml", "--end", "soon"], 1, "--end: 'soon'"),
         (["run", "game.xml", "--plugin-path", "no.py"], 1, "no.py: there is no such plugin file"),
+        (["run", "game.xml", "--plugin-path", "."], 1, ".: it is a folder; a plugin file is one Python file; in the folder there are"),
         (["run", "game.xml", "--start-from", "no.csv"], 4, "no.csv"),
         (["run", "game.xml", "--out", "game.xml"], 4, "game.xml"),
         (["check", "game.xml", "--set", "prey.motion_model=SimpleAircraft"], 1, "game.xml:7: block 'prey': no plugin writes"),

@@ -136,7 +136,8 @@ def test_the_port_is_taken_by_one_and_free_after_it(game, port):
     with (
         Simulation(game),
         pytest.raises(
-            (ParameterError, PluginError), match=f"cannot serve 127.0.0.1:{port}: the port is taken"
+            (ParameterError, PluginError),
+            match=f"port: 127.0.0.1:{port} cannot be opened: Address already in use",
         ),
     ):
         Simulation(game)

@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 
 from tussle import Block, Mission, Simulation
 from tussle.api import EasyAutonomy, Output, Param
-from tussle.errors import MissionError, ParameterError, PluginError
+from tussle.errors import MissionError, ParameterError, PluginError, PortError
 from tussle.mission import read_mission
 from tussle.numeric.quaternion import quat_normalize
 from tussle.plugins import stock
@@ -549,7 +549,8 @@ def test_a_port_that_is_taken_is_named_and_one_that_is_left_is_free():
     with Simulation(scene) as sim:
         sim.step()
         with pytest.raises(
-            (ParameterError, PluginError), match=f"listen_port = {port} of 127.0.0.1: Address already in use"
+            (PortError, PluginError),
+            match=f"listen_port: 127.0.0.1:{port} cannot be opened: Address already in use",
         ):
             Simulation(scene)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as again:

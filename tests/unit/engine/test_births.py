@@ -468,8 +468,13 @@ def test_births_by_message_of_several_blocks_get_the_same_ids_in_any_stack():
     ],
 )
 def test_asking_with_a_state_that_is_none_names_who_asked(state, message, interactions):
-    sim = Simulation(mission(block("a"), interactions=interactions))
-    sim.publish(SpawnEntity, block="a", **state)
+    class Asks(Interaction):
+        def step(self, w):
+            w.publish(SpawnEntity, w.active_worlds(), block="a", **state)
+
+    sim = Simulation(mission(block("a"), interactions=[*interactions, Asks()]))
+    with pytest.raises(ParameterError, match=f"^SpawnEntity: {message}"):
+        sim.publish(SpawnEntity, block="a", **state)
     with pytest.raises(PluginError, match=f"^sent by entity 0, world 0, step 0: SpawnEntity: {message}"):
         sim.step()
 

@@ -4,9 +4,17 @@ import numpy as np
 import pytest
 
 from tussle import Block, Mission, Recorder, Simulation, load_run
-from tussle.api import Autonomy, Interaction, Output, Publish, State, Subscribe
+from tussle.api import Autonomy, EntityRef, Interaction, Output, Publish, State, Subscribe
 from tussle.errors import ParameterError, WiringError
-from tussle.messages import CustomKeyPress, WorldPointClicked
+from tussle.messages import (
+    CustomKeyPress,
+    ManualControl,
+    Message,
+    RemoveEntity,
+    SpawnEntity,
+    WorldPointClicked,
+)
+from tussle.record.inputs import ExternalInput
 from tussle.stock import GlobalNetwork, LocalNetwork, SingleIntegrator, Still
 
 
@@ -123,6 +131,60 @@ def test_what_cannot_be_said():
         sim.publish(WorldPointClicked, network="GlobalNetwerk", pos=(1, 2, 3))
     with pytest.raises(WiringError, match="carries WorldPointClicked, not CustomKeyPress"):
         sim.publish(CustomKeyPress, topic="WorldPointClicked", key="k")
+
+
+REFERRING = [
+    (type_, name)
+    for type_ in Message.__subclasses__()
+    if type_.__module__ == Message.__module__
+    for name, column in type_.fields.items()
+    if isinstance(column, EntityRef)
+]
+
+
+@pytest.mark.parametrize(("type_", "name"), REFERRING, ids=lambda each: getattr(each, "__name__", each))
+@pytest.mark.parametrize("wrong", [-1, 4, 2**62])
+def test_no_message_names_an_entity_that_never_was(type_, name, wrong):
+    with game(seeds=[1, 2]) as sim:
+        before = sim.state_hash()
+        others = {each: 1 for kind, each in REFERRING if kind is type_} | {name: [3, wrong]}
+        with pytest.raises(
+            ParameterError, match=rf"{type_.__name__}: {name} = {wrong} .*no entity of world 1 .* to 3"
+        ):
+            sim.publish(type_, **others)
+        assert sim.state_hash() == before
+        sim.publish(type_, **others | {name: 3})
+
+
+@pytest.mark.parametrize("type_", [RemoveEntity, ManualControl])
+def test_a_request_about_nobody_is_refused_and_one_about_the_dead_is_not(type_):
+    with game() as sim:
+        with pytest.raises(ParameterError, match=r"entity = 0 is not allowed.*ids are 1 to 3$"):
+            sim.publish(type_)
+        sim.publish(RemoveEntity, entity=2, why="test")
+        sim.step()
+        sim.publish(type_, entity=2)
+        sim.step()
+        assert sim.state.population.bodies.id.tolist() == [1, 3]
+
+
+def test_a_recording_from_before_such_requests_were_refused_is_still_played():
+    with game() as sim:
+        sim.play_inputs([ExternalInput(0, "message", "RemoveEntity", {"entity": 77, "why": "test"})])
+        sim.step(2)
+        assert sim.state.population.bodies.id.tolist() == [1, 2, 3]
+
+
+@pytest.mark.parametrize(
+    ("fields", "text"),
+    [
+        ({"block": "dron"}, r"SpawnEntity: there is no block 'dron' \(did you mean 'drone'\?\)"),
+        ({"block": "drone", "pos": (0, 0, np.nan)}, "SpawnEntity: pos"),
+    ],
+)
+def test_a_birth_that_cannot_be_is_refused_before_the_step(fields, text):
+    with game() as sim, pytest.raises(ParameterError, match=text):
+        sim.publish(SpawnEntity, **fields)
 
 
 def test_steps_that_are_replayed_are_recorded_once(tmp_path):

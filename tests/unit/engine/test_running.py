@@ -23,6 +23,7 @@ from small_worlds import (
 from tussle import Block, Mission, Simulation
 from tussle.api import Autonomy, Interaction, Metric, Output, Param, State
 from tussle.errors import MissionError, ParameterError, SnapshotError
+from tussle.scene import Cuboid, Scene
 from tussle.stock import FreeBody, NoisyContacts, Predator, SimpleCapture, SimpleCollision, Still, Unicycle
 
 
@@ -312,8 +313,23 @@ def test_snapshots_of_something_else_are_refused():
     saved = Simulation(mission()).snapshot()
     with pytest.raises(SnapshotError, match=r"has 1 worlds of mission .*, the simulation 2"):
         Simulation(mission(), seeds=[1, 2]).restore(saved)
-    with pytest.raises(SnapshotError, match="missions must be equal"):
-        Simulation(mission(block("b"))).restore(saved)
+
+
+@pytest.mark.parametrize(
+    ("other", "differs"),
+    [
+        (mission(block("b")), r"a = Block \(here absent\), b = absent \(here Block\)$"),
+        (mission(dt=0.25), r"run.dt = 0.1 \(here 0.25\)$"),
+        (mission(block(count=7)), r"a.count = 1 \(here 7\)$"),
+        (mission(block(autonomy=Drift(to=(1, 2, 3)))), r"a.Drift.to = .* \(here \(1.0, 2.0, 3.0\)\)$"),
+        (mission(block(motion=Unicycle(), autonomy=Substeps())), r"a.Drift = Drift \(here absent\), .*, and \d more$"),
+        (mission(scene=Scene(walls=[Cuboid((0, 0, 0), (1, 1, 1))])), r"run.scene = Scene.*"),
+    ],
+)  # fmt: skip
+def test_a_snapshot_of_another_mission_says_what_differs(other, differs):
+    saved = Simulation(mission()).snapshot()
+    with pytest.raises(SnapshotError, match=rf"missions must be equal; in the snapshot, {differs}"):
+        Simulation(other).restore(saved)
 
 
 def test_snapshot_of_groups_that_are_not_there():

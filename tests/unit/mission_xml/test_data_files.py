@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import pickle
 import re
 
 import pytest
 
+from tussle import Block, Mission, Simulation
 from tussle.api import MotionModel
 from tussle.errors import MissingFileError, MissionError
 from tussle.mission.catalogue import KINDS
 from tussle.mission.data_files import VARIABLE, DataFiles, data_folders
+from tussle.mission.paths import with_value
 from tussle.plugins import stock
+from tussle.stock import Predator, SingleIntegrator, Unicycle
 
 PIXELS = "P2 3 2 255 0 255 100 0 255 255"
 MAP = """<params><filename>wall.pgm</filename><resolution>0.5</resolution><x_origin>10</x_origin><y_origin>20</y_origin>
@@ -191,6 +195,31 @@ def test_a_team_that_no_entity_has_is_noted_of_whatever_plugin_names_it(files):
         note = f"{cls.__name__}.{name} = 99: no <entity> has this team; there are: 1"
         assert any(note in each for each in tagged(tag, cls, f'{name}="99"', files).notes), note
         assert not any("has this team" in each for each in tagged(tag, cls, f'{name}="1"', files).notes)
+
+
+def test_a_mission_of_python_is_noted_too_and_one_of_a_file_once(files):
+    for tag, cls, name in naming(r"(^|_)team(_id)?$"):
+        if cls.__name__ in OWNED:
+            continue
+        plugin = cls(**{name: type(cls.params()[name].default)(99)})
+        is_inside = tag in ("autonomy", "sensor", "controller")
+        block = Block(name="a", team=1, motion=SingleIntegrator(), **({tag: plugin} if is_inside else {}))
+        kinds = {"entity_interaction": "interactions", "metrics": "metrics", "network": "networks"}
+        mission = Mission(blocks=[block], **({} if is_inside else {kinds[tag]: plugin}))
+        where = "block 'a'" if is_inside else "mission"
+        note = f"{where}: {cls.__name__}.{name} = 99: no block has this team; there are: 1"
+        assert list(mission.absent_teams()) == [note]
+    block = Block(name="a", team=1, autonomy=Predator(prey_team_id=99), motion=Unicycle())
+    with pytest.warns(RuntimeWarning, match="prey_team_id = 99: no block has this team"):
+        Simulation(Mission(blocks=[block]).replace(dt=0.2)).close()
+    read = tagged("autonomy", Predator, 'prey_team_id="99"', files).mission
+    for each in (
+        read,
+        read.replace(dt=0.2),
+        with_value(read, "run.dt", 0.2),
+        pickle.loads(pickle.dumps(read)),
+    ):
+        Simulation(each).close()
 
 
 def test_a_file_that_is_missing_refuses_the_mission_of_whatever_plugin_names_it(files):

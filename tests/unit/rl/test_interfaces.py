@@ -1,5 +1,6 @@
 """The checkers of Gymnasium, PettingZoo and SuperSuit hold for tasks."""
 
+import re
 import types
 import warnings
 from dataclasses import replace
@@ -105,6 +106,16 @@ def test_actions_that_do_not_fit_are_refused(task):
     ]:
         with pytest.raises(ParameterError, match=message):
             vec.step(actions)
+
+
+@pytest.mark.parametrize("space", ["observation_space", "action_space"])
+@pytest.mark.parametrize("wrong", ["pray_2", "", 2, None, ["prey_2"]])
+def test_a_space_of_nobody_names_who_there_is(task, space, wrong):
+    for env in (parallel_env(task), parallel_to_aec(parallel_env(task))):
+        near = r" \(did you mean 'prey_2'\?\)" if isinstance(wrong, str | list) and wrong else ""
+        text = rf"^{re.escape(repr(wrong))} is no agent{near}; there are: prey_0, .*prey_5$"
+        with pytest.raises(ParameterError, match=text):
+            getattr(env, space)(wrong)
 
 
 RAGGED = [[1.0, 2.0], [3.0]]

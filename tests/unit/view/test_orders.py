@@ -55,7 +55,7 @@ def test_values_of_all_kinds_are_those_of_the_message():
         -(2**62) - 1, True, 4, ["käse"],
     )  # fmt: skip
     assert fields_from(Parcel, {"rows": []})["rows"][0].shape == (2, 0)
-    with Simulation(Mission(blocks=[Block(name="a", motion=Still())], end=1.0), 1) as simulation:
+    with Simulation(Mission(blocks=[Block(name="a", count=4, motion=Still())], end=1.0), 1) as simulation:
         simulation.publish(Parcel, **found)
 
 

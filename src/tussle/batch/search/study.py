@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
+from tussle.arguments import explained
 from tussle.batch.points import settings_of
 from tussle.batch.search.proposals import importances
 from tussle.batch.search.trials import Trial, trials_table
@@ -20,6 +21,7 @@ from tussle.batch.variables import Value, Variable
 from tussle.mission.codecs import written
 
 
+@explained
 @dataclass(frozen=True)
 class Study:
     """The trials of a search.

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 import pyarrow.parquet as pq
 
+from tussle.arguments import explained
 from tussle.batch.consistency import MAX_VALUE
 from tussle.batch.plan import MAX_RUNS
 from tussle.batch.schemas import SEED, VARIABLE
@@ -247,6 +248,7 @@ def _against(i: int, trial: Any, info: Mapping[str, Any]) -> str:
     return ""
 
 
+@explained
 def load_study(path: str | Path) -> Study:
     """Load a search, finished or still running.
 

@@ -8,6 +8,7 @@ from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
+from tussle.arguments import explained
 from tussle.documents import read_bytes
 from tussle.errors import ParameterError, clipped, listed, nearest_name
 from tussle.view.ground_map.geotiff import placed_geotiff
@@ -29,6 +30,7 @@ NO_ORIGIN = (
 )
 
 
+@explained
 @dataclass(frozen=True)
 class GroundMap:
     """A map that pictures show on the ground: a PNG or JPEG with bounds, a GeoTIFF, MBTiles or PMTiles.

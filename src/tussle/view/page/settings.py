@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
-from tussle.api import Plugin
 from tussle.mission import Mission
-from tussle.mission.paths import MissionRoot, inside, settable
+from tussle.mission.paths import values_of
 from tussle.view.page.formatting import number
 from tussle.view.recording import Recording
+
+LEFT_OUT = "run.blocks", "run.scene", "run.limits", "run.name"
 
 
 def differing_settings(a: Recording, b: Recording) -> list[tuple[str, str, str]]:
@@ -35,34 +36,14 @@ def _played(run: Recording) -> dict[str, str]:
 
 
 def _of_mission(mission: Mission) -> dict[str, str]:
-    """Every value of a mission by its path, such as "prey.Boids.gain", as text."""
-    found: dict[str, str] = {}
-
-    def walk(path: tuple[str, ...], owner: Any) -> None:
-        members = inside(owner)
-        for name in settable(owner):
-            value = owner.values.get(name) if isinstance(owner, Plugin) else getattr(owner, name)
-            if _is_plugins(value) or (
-                isinstance(owner, Mission) and name in ("blocks", "scene", "limits", "name")
-            ):
-                continue
-            found[".".join([*path, name])] = _text(value)
-        for name, member in members.items():
-            found[".".join([*path, name])] = type(member).__name__
-            walk((*path, name), member)
-
-    walk((), MissionRoot(mission))
-    return found
-
-
-def _is_plugins(value: Any) -> bool:
-    return isinstance(value, Plugin) or (
-        isinstance(value, tuple) and any(isinstance(v, Plugin) for v in value)
-    )
+    """Every value of a mission by its path, as text."""
+    return {path: _text(value) for path, value in values_of(mission).items() if path not in LEFT_OUT}
 
 
 def _text(value: Any) -> str:
-    """A value in SI units."""
+    """A value in SI units, or the name of a class."""
+    if isinstance(value, type):
+        return value.__name__
     if isinstance(value, tuple):
         return " ".join(_text(each) for each in value)
     return "none" if value is None else number(value)

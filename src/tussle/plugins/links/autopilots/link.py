@@ -9,9 +9,10 @@ import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Sequence
 
-from tussle.errors import ParameterError
+from tussle.errors import ParameterError, PortError
 from tussle.pacing import Pace
 from tussle.plugins.links.autopilots.frames import VehicleState
+from tussle.plugins.links.ports import opening
 
 TICK_PERIOD = 0.01
 """Longest wait before a state is sent again [s]."""
@@ -132,17 +133,18 @@ def bound(kind: socket.SocketKind, host: str, port: int, what: str) -> socket.so
     """A socket that is bound to an address, and does not wait.
 
     Raises:
-        ParameterError: The address cannot be used.
+        PortError: The address cannot be used.
     """
     made = socket.socket(socket.AF_INET, kind)
     made.setblocking(False)
     try:
-        if kind == socket.SOCK_STREAM:  # a port whose last connection has just ended is free
-            made.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        made.bind((host, port))
-    except OSError as error:
+        with opening(what, host, port):
+            if kind == socket.SOCK_STREAM:  # a port whose last connection has just ended is free
+                made.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            made.bind((host, port))
+    except PortError:
         made.close()
-        raise ParameterError(f"{what}: {host}:{port} cannot be opened: {error.strerror}") from None
+        raise
     return made
 
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import errno
 import re
+import socket
 from collections import deque
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
@@ -11,7 +13,8 @@ import numpy as np
 
 from tussle.api import Interaction, Param, WorldView
 from tussle.declare.messages import Messages, TextMessage
-from tussle.errors import ParameterError, clipped, listed, nearest_name
+from tussle.errors import PortError, clipped, listed, nearest_name
+from tussle.plugins.links.ports import opening
 from tussle.plugins.links.rpc import COMMANDS, SEND_COMMAND, load_grpc, message_types
 
 MAX_WAITING = 10_000
@@ -32,7 +35,7 @@ class GRPCCommandString(Interaction):
 
     Raises:
         MissingExtraError: grpcio or protobuf are not installed.
-        ParameterError: The port is taken, or the address is not one of this machine.
+        PortError: The port is taken, or the address is not one of this machine.
     """
 
     grade = "external"
@@ -57,22 +60,46 @@ class GRPCCommandString(Interaction):
             w.context.topic(network, topic, TextMessage, self.instance_name).add(batch)
 
     def _server(self, w: WorldView) -> CommandServer:
-        address = f"{self.ip}:{self.port}"
         server: CommandServer = w.context.share(
-            (GRPCCommandString, address),
+            (GRPCCommandString, self.ip, self.port),
             lambda: CommandServer(
-                address,
+                self.ip,
+                self.port,
                 sorted({(t.network, t.name) for t in w.by_type.get(TextMessage, ()) if t.inboxes}),
             ),
         )
         return server
 
 
+def _check_port(host: str, port: int) -> None:
+    """Check that a port is free at all addresses of a host, of which gRPC is content with one.
+
+    Raises:
+        PortError: Another program has it.
+    """
+    try:
+        places = socket.getaddrinfo(host.strip("[]"), port, type=socket.SOCK_STREAM)
+    except (OSError, UnicodeError):  # names of gRPC's own, such as those of Unix sockets
+        return
+    for family, kind, protocol, _, place in places:
+        with opening("port", host, port):
+            try:
+                with socket.socket(family, kind, protocol) as probe:
+                    probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+                    if family == socket.AF_INET6:
+                        probe.setsockopt(socket.IPPROTO_IPV6, socket.IPV6_V6ONLY, 1)
+                    probe.bind(place)
+            except OSError as error:  # a machine without IPv6 may still have the name
+                if error.errno == errno.EADDRINUSE:
+                    raise
+
+
 class CommandServer:
     """A gRPC server that takes commands.
 
     Args:
-        address: Host and port.
+        ip: Own address that is served.
+        port: Its port.
         subscribed: Network and name of each topic that plugins listen to.
 
     Attributes:
@@ -80,7 +107,7 @@ class CommandServer:
         waiting: Network, topic, text, and id of the entity that it is for or 0, of commands that are not yet published.
     """
 
-    def __init__(self, address: str, subscribed: list[tuple[str, str]]) -> None:
+    def __init__(self, ip: str, port: int, subscribed: list[tuple[str, str]]) -> None:
         grpc = load_grpc("GRPCCommandString")
         self.waiting: deque[tuple[str, str, str, int]] = deque()
         self._subscribed, self._status, self.last_id = subscribed, grpc.StatusCode, 0
@@ -97,10 +124,11 @@ class CommandServer:
             [grpc.method_handlers_generic_handler(service, {method: handler})]
         )
         try:
-            self._server.add_insecure_port(address)
+            _check_port(ip, port)
+            self._server.add_insecure_port(f"{ip}:{port}")
         except RuntimeError:
-            raise ParameterError(
-                f"GRPCCommandString: cannot serve {address}: the port is taken, or ip is no address of this machine"
+            raise PortError(
+                f"port: {ip}:{port} cannot be opened: it is taken, or ip is no address of this machine"
             ) from None
         self._server.start()
 

@@ -9,8 +9,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tussle.errors import ParameterError
+from tussle.errors import ParameterError, PortError
 from tussle.pacing import Pace
+from tussle.plugins.links.ports import opening
 from tussle.plugins.stock.interaction.dis import pdu
 from tussle.world.geodesy import Origin
 
@@ -57,7 +58,8 @@ class ExerciseLink:
         n_sent: PDUs sent; n_received and n_refused likewise.
 
     Raises:
-        ParameterError: An address is not known, or the port is taken.
+        ParameterError: An address is not known.
+        PortError: The port is taken.
     """
 
     def __init__(self, address: str, port: int, listen_address: str, listen_port: int, warp: float) -> None:
@@ -71,22 +73,21 @@ class ExerciseLink:
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self.socket.settimeout(None)  # rospy sets a default, with which MSG_DONTWAIT waits
         try:
-            self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_BROADCAST, 1)
-            if group := ipaddress.ip_address(self._place[0]).is_multicast:
-                self.socket.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_IF, socket.inet_aton(own))
-            if self._listens:
-                self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER)
-                if group or own.endswith(BROADCAST):  # a port that all simulators of a machine share
-                    self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-                if group:
-                    member = socket.inet_aton(self._place[0]) + socket.inet_aton(own)
-                    self.socket.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, member)
-                self.socket.bind((self._place[0] if group else own, listen_port))
-        except OSError as reason:
+            with opening("listen_port", listen_address, listen_port):
+                self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_BROADCAST, 1)
+                if group := ipaddress.ip_address(self._place[0]).is_multicast:
+                    self.socket.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_IF, socket.inet_aton(own))
+                if self._listens:
+                    self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER)
+                    if group or own.endswith(BROADCAST):  # a port that all simulators of a machine share
+                        self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+                    if group:
+                        member = socket.inet_aton(self._place[0]) + socket.inet_aton(own)
+                        self.socket.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, member)
+                    self.socket.bind((self._place[0] if group else own, listen_port))
+        except PortError:
             self.socket.close()
-            raise ParameterError(
-                f"DIS: listen_port = {listen_port} of {listen_address}: {reason.strerror}"
-            ) from None
+            raise
 
     def begin(self, t: float) -> None:
         """Begin a step that ends at time t [s]. When that is before the last one, after a reset, all remote entities come anew."""
