@@ -46,7 +46,9 @@ def pytest_collection() -> Generator[None, object, object]:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Slow tests come first, so that at the end no worker waits for one."""
+    """Slow tests come first, so that at the end no worker waits for one; with TUSSLE_TEST_BACKWARDS=1, the last of a module first."""
+    if os.environ.get("TUSSLE_TEST_BACKWARDS"):
+        items.reverse()
     items.sort(key=lambda item: item.get_closest_marker("slow") is None)
 
 
