@@ -65,11 +65,9 @@ def in_order(bodies: Bodies) -> Bodies:
     return Bodies(bodies.floats.take(order, axis=1), bodies.ints.take(order, axis=1), bodies.n_worlds)
 
 
-def _placing(block: Block) -> tuple[np.ndarray, np.ndarray]:
-    """Placement of a block's entities, as flags and shape of `kernels.scatter`."""
-    is_uniform = block.placement == "uniform"
-    width = block.half_width if is_uniform else np.sqrt(block.variance)
-    return np.array([is_uniform, block.scatter_first]), np.array([block.position, width], float)
+def _flags(block: Block) -> np.ndarray:
+    """How entities of a block are scattered, as flags of `kernels.scatter`."""
+    return np.array([block.placement == "uniform", block.scatter_first])
 
 
 class Births:
@@ -101,7 +99,7 @@ class Births:
             np.full((n_worlds, b.slots if b.rate else 0), np.inf) for b in overrides.mission.blocks
         ]
         self.has_rates = any(b.rate for b in overrides.mission.blocks)
-        self._placing = [_placing(b) for b in overrides.mission.blocks]
+        self._flags = [_flags(b) for b in overrides.mission.blocks]
 
     def begin(self, worlds: np.ndarray) -> dict[int, np.ndarray]:
         """Reset worlds. Returns block number -> world of each initial entity."""
@@ -210,9 +208,9 @@ class Births:
         out = new.id, new.block_index, new.pos, new.vel, new.quat, new.health, new.radius, new.mass
         counts = self.next_id, self.n_born[block]
         kernels.place_newborn(
-            (keys, worlds), (POSITION, HEADING), *self._placing[block], block_values, counts, out, mine.start
-        )
-        self._first_places(block, new.pos[:, mine])
+            (keys, worlds), (POSITION, HEADING), self._flags[block], self._shape(block, worlds), block_values, counts, out, mine.start
+        )  # fmt: skip
+        self._first_places(block, worlds, new.pos[:, mine])
         if "pos" not in where and occupancy is not None:
             places = keys, new.block_index[mine]
             waiting = self._separate(block, worlds, places, new.pos[:, mine], occupancy)
@@ -224,6 +222,14 @@ class Births:
         for name, values in where.items():
             getattr(new, name)[..., mine] = values
 
+    def _shape(self, block: int, worlds: np.ndarray) -> np.ndarray:
+        """Where entities of a block are placed in the worlds `worlds`, as shape of `kernels.place_newborn`."""
+        spec = self.overrides.mission.blocks[block]
+        if spec.placement == "uniform":
+            return self.overrides.block_values(spec, ("position", "half_width"), worlds)
+        values = self.overrides.block_values(spec, ("position", "variance"), worlds)
+        return np.concatenate([values[:3], np.sqrt(values[3:])])
+
     def _keys(self, block: int, worlds: np.ndarray) -> np.ndarray:
         """Random keys of the next entities of a block, one per item of `worlds` (sorted), (m,)."""
         keys = self.seeds[worlds] ^ self.keys[block]
@@ -232,7 +238,7 @@ class Births:
         index = self.n_born[block, worlds] + np.arange(len(worlds)) - np.searchsorted(worlds, worlds)
         return self.context.redrawn(keys, ("", ""), worlds, np.full(len(worlds), block), index)
 
-    def _first_places(self, block: int, pos: np.ndarray) -> None:
+    def _first_places(self, block: int, worlds: np.ndarray, pos: np.ndarray) -> None:
         """Change the first drawn positions [m], (3, m), of entities of a block, in place. Does nothing by default."""
 
     def _separate(
@@ -276,6 +282,7 @@ class Births:
         n_again = int(self._n_again[block, world]) if waits else 0
         before = occupancy.occupied(world)
         n = before.shape[1]
+        shape = self._shape(block, np.array([world]))
         taken = np.empty((3, n + len(mine)))
         taken[:, :n] = before
         for number, i in enumerate(mine):
@@ -295,7 +302,7 @@ class Births:
                     )
                 redrawn = np.empty(3)
                 kernels.scatter(
-                    keys[i], POSITION, indices[i], first + attempt, *self._placing[block], redrawn
+                    keys[i], POSITION, indices[i], first + attempt, self._flags[block], shape, redrawn
                 )
                 pos[:, i] = redrawn
             taken[:, n] = pos[:, i]

@@ -45,10 +45,10 @@ class HistoricBirths(Births):
             new.vel[:, mine] = 0.0
             new.vel[0, mine] = self.overrides.block_values(spec, ("speed",), worlds)[0]
 
-    def _first_places(self, block: int, pos: np.ndarray) -> None:
+    def _first_places(self, block: int, worlds: np.ndarray, pos: np.ndarray) -> None:
         spec = self.overrides.mission.blocks[block]
         if spec.placement == "normal" and not spec.scatter_first:
-            pos[:] = np.array(spec.position)[:, None]
+            pos[:] = self.overrides.block_values(spec, ("position",), worlds)
 
     def _attitudes(self, block: int, worlds: np.ndarray, places: np.ndarray) -> np.ndarray:
         """Quaternions, (4, m), of entities by their worlds and numbers in the block, (m,) each."""

@@ -11,8 +11,8 @@ from tussle.numeric.rng import normal2, uniform2
 
 
 @device
-def drawn_place(seed, stream, index, attempt, flags, shape):
-    """Return the position x, y, z [m] of entity number `index` of a block; flags and shape as in `scatter`."""
+def drawn_place(seed, stream, index, attempt, flags, shape, k):
+    """Return the position x, y, z [m] of entity number `index` of a block; flags and column k of shape as in `scatter`."""
     if attempt == 0 and index == 0 and not flags[1]:
         x, y, z = 0.0, 0.0, 0.0
     elif flags[0]:
@@ -22,7 +22,7 @@ def drawn_place(seed, stream, index, attempt, flags, shape):
     else:
         x, y = normal2(seed, stream, index, 0, attempt, 0)
         z, _ = normal2(seed, stream, index, 0, attempt, 1)
-    return shape[0, 0] + x * shape[1, 0], shape[0, 1] + y * shape[1, 1], shape[0, 2] + z * shape[1, 2]
+    return shape[0, k] + x * shape[3, k], shape[1, k] + y * shape[4, k], shape[2, k] + z * shape[5, k]
 
 
 @kernel("u8 u8 i8 i8 B F2 Fw")
@@ -30,9 +30,9 @@ def scatter(seed, stream, place, attempt, flags, shape, pos):
     """Draw the position [m], (3,), of an entity of a block.
 
     place: number of the entity in its block. flags: True for positions that are uniform in a box, False for normally distributed
-    ones; True if the first entity is scattered too. shape: centre and half width or standard deviation [m], (2, 3).
+    ones; True if the first entity is scattered too. shape: centre and half width or standard deviation [m], (6, 1).
     """
-    pos[0], pos[1], pos[2] = drawn_place(seed, stream, place, attempt, flags, shape)
+    pos[0], pos[1], pos[2] = drawn_place(seed, stream, place, attempt, flags, shape, 0)
 
 
 @kernel("(U I) (u8 u8) B F2 F2 (Iw Iw) (Iw Iw F2w F2w F2w Fw Fw Fw) i8")
@@ -40,23 +40,25 @@ def place_newborn(worlds, keys, flags, shape, values, counts, out, first):
     """Set ids, positions, attitudes and velocities of the newborn entities, (m,), of a block.
 
     worlds: random key and world of each newborn. keys: of the streams of positions and headings.
-    flags, shape: as in `scatter`. values: heading, climb, roll [rad], speed [m/s], variance of the heading [rad^2], health, radius
-    [m], mass [kg], (8, m) or (8, 1). counts: next id of each world, and number of entities of the block born so far; both are
-    advanced. out: columns whose rows from `first` on are written: id, block index, position [m], velocity [m/s], (3, n), quaternion,
-    (4, n), health, radius, mass.
+    flags, shape: as in `scatter`, with a column for each newborn, (6, m), or one for all. values: heading, climb, roll [rad], speed
+    [m/s], variance of the heading [rad^2], health, radius [m], mass [kg], (8, m) or (8, 1). counts: next id of each world, and number
+    of entities of the block born so far; both are advanced. out: columns whose rows from `first` on are written: id, block index,
+    position [m], velocity [m/s], (3, n), quaternion, (4, n), health, radius, mass.
     """
     seeds, world = worlds
     position, turning = keys
     next_id, n_born = counts
     ids, places, pos, vel, quat, health, radius, mass = out
-    last = values.shape[1] - 1
+    last, last_shape = values.shape[1] - 1, shape.shape[1] - 1
     for j in range(world.shape[0]):
         w, k, i = world[j], min(j, last), first + j
         ids[i], places[i] = next_id[w], n_born[w]
         next_id[w] += 1
         n_born[w] += 1
         seed = seeds[j]
-        pos[0, i], pos[1, i], pos[2, i] = drawn_place(seed, position, places[i], 0, flags, shape)
+        pos[0, i], pos[1, i], pos[2, i] = drawn_place(
+            seed, position, places[i], 0, flags, shape, min(j, last_shape)
+        )
         jitter, _ = normal2(seed, turning, places[i], 0, 0, 0)
         yaw = values[0, k] + math.sqrt(values[4, k]) * jitter
         climb, speed = values[1, k], values[3, k]

@@ -32,7 +32,7 @@ class Overrides:
         self.columns: dict[Key, np.ndarray] = {}
         self.given: dict[Key, np.ndarray] = {}
         self.structural: dict[Key, list[Any]] = {}
-        self._block_values: dict[tuple[str, tuple[str, ...]], np.ndarray] = {}
+        self._block_values: dict[tuple[str, tuple[str, ...]], tuple[np.ndarray, list[int]]] = {}
         self._variants: dict[tuple[Any, ...], tuple[Block, ...]] = {}
 
     def set(self, values: Mapping[str, Any], worlds: np.ndarray) -> None:
@@ -122,18 +122,19 @@ class Overrides:
         return (names[0], plugins, name), column, owners[-1]
 
     def block_values(self, block: Block, names: Sequence[str], world: np.ndarray) -> np.ndarray:
-        """Values of a block for entities of the worlds `world`, (k, m), or (k, 1) if all are equal."""
+        """Values of a block for entities of the worlds `world`, a row for each component, (k, m), or (k, 1) if all are equal."""
         cache_key = block.name, tuple(names)
-        values = self._block_values.get(cache_key)
-        if values is None:
-            values = np.array([[getattr(block, name)] for name in names], float)
-            self._block_values[cache_key] = values
+        if cache_key not in self._block_values:
+            own = [np.array(getattr(block, name), float).reshape(-1, 1) for name in names]
+            self._block_values[cache_key] = np.concatenate(own), np.cumsum([len(v) for v in own]).tolist()
+        values, ends = self._block_values[cache_key]
         keys = [(block.name, (), name) for name in names] if self.columns else []
         if any(key in self.columns for key in keys):
             values = np.repeat(values, len(world), axis=1)
-            for own, key in zip(values, keys, strict=True):
+            for first, end, key in zip([0, *ends[:-1]], ends, keys, strict=True):
                 if key in self.columns:
-                    np.copyto(own, self.columns[key][world], where=self.given[key][world])
+                    given = self.given[key][world]
+                    values[first:end, given] = self.columns[key][world[given]].reshape(-1, end - first).T
         return values
 
     def fill(self, owner: str, path: tuple[str, ...], name: str, base: Any, world: np.ndarray) -> np.ndarray:

@@ -278,7 +278,10 @@ BLOCK_VALUES = _declared(
     without_space={"choices": WITHOUT_SPACE},
 )
 """Declarations of a block's values, like those of plugin parameters."""
-WORLD_VALUES = ("heading", "climb", "roll", "speed", "health", "radius", "mass")
+WORLD_VALUES = (
+    *("position", "variance", "half_width", "heading", "heading_variance", "climb", "roll"),
+    *("speed", "health", "radius", "mass"),
+)
 """Values of a block that may differ between the worlds of a stack."""
 
 

@@ -123,11 +123,13 @@ SHARED = [
     ("Roulette.harm", [(1.0, 1.0), (1.0, 2.0)]),
     ("reds.speed", [0.0, 1.0]),
     ("reds.health", [1.0, 3.0]),
+    ("reds.position", [(0.0, 0.0, 0.0), (1.0, 0.0, 0.0)]),
+    ("reds.variance", [(0.0, 0.0, 0.0), (1.0, 0.0, 0.0)]),
     ("Trouble.at", [2, 3]),
 ]
 SPLIT = [
     ("reds.count", [1, 2, 3]),
-    ("reds.position", [(0.0, 0.0, 0.0), (1.0, 0.0, 0.0)]),
+    ("reds.scatter_first", [False, True]),
     ("reds.motion", [Still(), SingleIntegrator()]),
     ("run.dt", [0.1, 0.05]),
     ("run.end", [1.0, 2.0]),

@@ -10,6 +10,7 @@ from tussle import Simulation
 from tussle.api import Autonomy, Interaction, Metric, Param, Publish, State
 from tussle.errors import MissionError, ParameterError, PluginError, TussleError
 from tussle.messages import SpawnEntity, Waypoint
+from tussle.mission.spec import WORLD_VALUES
 from tussle.stock import SimpleCollision, SingleIntegrator
 
 
@@ -455,6 +456,40 @@ def test_births_by_message_of_several_blocks_get_the_same_ids_in_any_stack():
         one.run()
         assert one.state_hash() == stack.state_hash(world)
     assert stack.read("x.id")[0][:, 0].tolist() == [2, 2, 3]
+
+
+START_VALUES = {
+    "position": [(0, 0, 5), (40, 0, 5), (0, -9, 7)],
+    "variance": [(9, 9, 0), (1, 2, 3), (0, 4, 0)],
+    "half_width": [(3, 3, 0), (3, 4, 5), (9, 1, 0)],
+    "heading": [0.0, 1.0, 2.0],
+    "heading_variance": [0.0, 0.1, 0.2],
+    "climb": [0.0, 0.1, -0.1],
+    "roll": [0.0, 0.2, 0.0],
+    "speed": [0.0, 1.0, 2.0],
+    "health": [1.0, 2.0, 3.0],
+    "radius": [0.5, 0.7, 0.9],
+    "mass": [1.0, 2.0, 3.0],
+}
+
+
+@pytest.mark.parametrize("compat", ["", "scrimmage"])
+@pytest.mark.parametrize("rate", [None, 20.0])
+@pytest.mark.parametrize("scatter_first", [False, True])
+@pytest.mark.parametrize("placement", ["normal", "uniform"])
+def test_each_world_starts_with_its_values_as_alone(placement, scatter_first, rate, compat):
+    assert set(START_VALUES) == set(WORLD_VALUES)
+    one = block("a", count=6, placement=placement, scatter_first=scatter_first, rate=rate)
+    game = mission(one, interactions=[SimpleCollision()]).replace(compat=compat)
+    params = {f"a.{name}": values for name, values in START_VALUES.items()}
+    stack = Simulation(game, seeds=[1, 2, 3], params=params)
+    stack.step(5)
+    for world in range(3):
+        own = one.replace(**{name: values[world] for name, values in START_VALUES.items()})
+        alone = Simulation(game.replace(blocks=[own]), seeds=world + 1)
+        alone.step(5)
+        assert len(ids(alone)) > 1
+        assert alone.state_hash() == stack.state_hash(world)
 
 
 @pytest.mark.parametrize("interactions", [[], [SimpleCollision()]])
