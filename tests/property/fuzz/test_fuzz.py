@@ -23,6 +23,7 @@ N_SMALL = int(os.environ.get("TUSSLE_FUZZ", "40"))
 CHUNK = 10
 pytestmark = [
     pytest.mark.filterwarnings("ignore:.*its messages are not received"),  # random networks often are two
+    pytest.mark.filterwarnings("ignore:.*no block has this team"),  # random plugins name random teams
     # NumPy warns once for all rows: made an error, it would end worlds that do not overflow.
     pytest.mark.filterwarnings("ignore:.* encountered in:RuntimeWarning"),
 ]
