@@ -69,7 +69,7 @@ class Observed:
         value = float((self.weight * (self.mean * f - np.logaddexp(0.0, f))).sum())
         return self.weight * (self.mean - p), self.weight * p * (1.0 - p), value
 
-    def third(self, f: np.ndarray) -> np.ndarray:
+    def third_derivative(self, f: np.ndarray) -> np.ndarray:
         """Third derivative of the logarithm of the likelihood of shares, (n,)."""
         p = scipy_package().special.expit(f)
         return np.asarray(self.weight * p * (1.0 - p) * (2.0 * p - 1.0))
@@ -109,7 +109,13 @@ class Covariance:
             found *= self.factor(i, along)
         return found
 
-    def growth(self, i: int, apart: np.ndarray) -> np.ndarray:
+    def of_points(self, varying: np.ndarray) -> np.ndarray:
+        """Covariance at the points themselves, (n, n), with the variance that no variable explains; `varying` as `varying` returns it."""
+        found = varying + CONSTANT
+        found[np.diag_indices(len(found))] += self.noise + JITTER
+        return found
+
+    def log_slope(self, i: int, apart: np.ndarray) -> np.ndarray:
         """Slope of the logarithm of the correlation along one axis, by the logarithm of its length or the logit of its correlation."""
         if not self.is_number[i]:
             return np.where(apart == 0.0, 0.0, 1.0 - self.shape[i])
@@ -138,8 +144,7 @@ class Posterior:
     ) -> None:
         linalg = scipy_package().linalg
         self.kernel, self.x = kernel, x
-        whole = (kernel.varying(distances(x, x)) if varying is None else varying) + CONSTANT
-        whole[np.diag_indices(len(x))] += kernel.noise + JITTER
+        whole = kernel.of_points(kernel.varying(distances(x, x)) if varying is None else varying)
         f, a = np.zeros(len(x)), np.zeros(len(x))
         if observed.is_share:  # a good place to begin
             f = np.log(
@@ -176,7 +181,7 @@ class Posterior:
 def evidence_slopes(
     mode: Posterior, observed: Observed, apart: np.ndarray, varying: np.ndarray
 ) -> np.ndarray:
-    """Slopes of the evidence by the logarithms of amplitude and noise, and by each axis as in `Covariance.growth`, (2 + n_axes,).
+    """Slopes of the evidence by the logarithms of amplitude and noise, and by each axis as in `Covariance.log_slope`, (2 + n_axes,).
 
     Rasmussen and Williams, algorithm 5.1.
 
@@ -192,15 +197,14 @@ def evidence_slopes(
     # The slope by the covariance of each pair: where the mode stands still, and by its move, which changes the curvature of shares.
     by_pair = 0.5 * (np.outer(mode.a, mode.a) - inverse)
     if observed.is_share:
-        whole = varying + CONSTANT
-        whole[np.diag_indices(len(whole))] += kernel.noise + JITTER
+        whole = kernel.of_points(varying)
         solved = inverse @ whole
         spread = whole.diagonal() - (whole * solved).sum(axis=0)
-        by_mode = 0.5 * spread * observed.third(mode.f)
+        by_mode = 0.5 * spread * observed.third_derivative(mode.f)
         by_pair += np.outer(by_mode - solved @ by_mode, slope)
     by_noise = kernel.noise * by_pair.trace()
     by_pair *= varying
-    by_shape = [float((by_pair * kernel.growth(i, along)).sum()) for i, along in enumerate(apart)]
+    by_shape = [float((by_pair * kernel.log_slope(i, along)).sum()) for i, along in enumerate(apart)]
     return np.array([by_pair.sum(), by_noise, *by_shape])
 
 
