@@ -59,6 +59,12 @@ class Notebook:
             self.page.wait_for_timeout(20)
         raise AssertionError("it does not come")
 
+    def press(self, name):
+        """Click a button once it is there: while a click waits for it, nothing is delivered to the page."""
+        button = self.frame.get_by_role("button", name=name, exact=True).first
+        self.until(button.is_visible)
+        button.click()
+
     def wait(self, expression):
         return self.until(lambda: self.frame.evaluate(f"() => Boolean(window.player) && ({expression})"))
 
@@ -103,10 +109,10 @@ def test_a_simulation_is_played_in_its_cell(watched):
         notebook = Notebook(watched("nothing"), view)
         live = view.live
         notebook.wait(f"player.isReady && player.t === 0 && player.ids.length === {len(live.frame())}")
-        notebook.frame.get_by_role("button", name="Play", exact=True).first.click()
+        notebook.press("Play")
         notebook.until(lambda: live.step_number > 3)
         notebook.wait("player.t > 0")
-        notebook.frame.get_by_role("button", name="Pause", exact=True).first.click()
+        notebook.press("Pause")
         notebook.until(lambda: live.is_paused and live.settle())
         notebook.wait(f"Math.abs(player.t - {live.t}) < 1e-6")
         gone = notebook.page.locator(".tussle-gone")

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from walks import ENTITIES, NORMAL, PROCESSES, begun, brownian, chain, gap, playing
+from walks import ENTITIES, NORMAL, PROCESSES, begun, brownian, chain, playing
 
 from tussle.numeric.kernel import collecting_later
 from tussle.stress import Played, Verdict
@@ -34,20 +34,24 @@ def test_moves_to_other_starts_change_no_probability(levels):
     assert error < 0.25 * exact
 
 
+def covering(exact, play, n, n_replaced, *redraws):
+    """How many of 100 studies of 20 repetitions have an interval that covers the exact probability."""
+    covered = 0
+    with collecting_later():  # many objects are made, and none is garbage
+        for first in range(0, 2000, 20):
+            repetitions = split(play, n, n_replaced, range(first, first + 20), 1, *redraws)
+            _, low, high = interval([r.probability for r in repetitions])
+            covered += low <= exact <= high
+    print(f"{exact:.2g}: {covered} of 100 intervals cover")
+    return covered
+
+
 @pytest.mark.slow
 def test_intervals_cover_a_probability_that_the_start_decides():
     """90 to 99 of 100 studies."""
     play, exact = begun(0.03)
     (before,) = split(play, 30, 7, [9000], 1)
-    with collecting_later():
-        repetitions = split(play, 30, 7, range(2000), 1, Redraws.of(before, ENTITIES, 1))
-    estimates = [r.probability for r in repetitions]
-    covered = [interval(estimates[20 * k : 20 * k + 20]) for k in range(100)]
-    n = sum(low <= exact <= high for _, low, high in covered)
-    print(
-        f"begun 0.03: {n} of 100 intervals cover; {np.mean([r.n_games for r in repetitions]):.0f} games in a repetition"
-    )
-    assert 90 <= n <= 100
+    assert 90 <= covering(exact, play, 30, 7, Redraws.of(before, ENTITIES, 1)) <= 100
 
 
 def guided_brownian(p, lead):
@@ -107,15 +111,8 @@ def test_a_repetition_whose_branches_are_all_alike_ends():
 def test_intervals_cover_the_exact_probability(process, p):
     """90 to 99 of 100 studies."""
     play, exact = process(p)
-    n = {chain: 200, gap: 50}.get(process, 100)
-    with collecting_later():  # millions of objects stay, and none is garbage
-        repetitions = split(play, n, n // 4, range(2000), 1)
-    covered = 0
-    for k in range(100):
-        _, low, high = interval([r.probability for r in repetitions[20 * k : 20 * k + 20]])
-        covered += low <= exact <= high
-    print(f"{process.__name__} {exact:.2g}: {covered} of 100 intervals cover")
-    assert 90 <= covered <= 100
+    n = 100 if process is chain else 50
+    assert 90 <= covering(exact, play, n, n // 4) <= 100
 
 
 def test_a_repetition_counts_its_games_and_their_ancestors():
