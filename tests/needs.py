@@ -147,6 +147,9 @@ NEEDS = {
         is_optional=True,
     ),
     "supersuit": package("SuperSuit", "supersuit", 13),
+    "tensorboard": Need(
+        "TensorBoard", _has_module("tensorboard"), command="pip install '.[tensorboard]'", is_optional=True
+    ),
     "torch": Need("PyTorch", _has_module("torch"), command="pip install '.[train]'", is_optional=True),
     "vmas": Need("VMAS", _has_module("vmas"), command="pip install vmas", is_optional=True),
     "tsc": Need("TypeScript", _has_program("tsc"), command="npm install", is_optional=True),

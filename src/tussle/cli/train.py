@@ -22,9 +22,10 @@ def train(options: TrainOptions) -> int:
         The exit code.
 
     Raises:
-        MissingExtraError: PyTorch is not installed.
+        MissingExtraError: PyTorch, or TensorBoard if it is asked for, is not installed.
         ParameterError: The task is unknown, or the directory has a checkpoint that would be overwritten, or none to continue from.
     """
+    from tussle.rl.evaluation import Board, record_extremes
     from tussle.rl.flight import registered_task
     from tussle.rl.opponents import Pool
     from tussle.rl.settings import Settings, read_training
@@ -53,6 +54,7 @@ def train(options: TrainOptions) -> int:
         trainer = Trainer(task, options.task, folder, options.seed, settings)
     if options.resume:
         trainer.resume()
+    board = Board(folder / "tensorboard") if options.board else None
     with Interrupt() as interrupt:
 
         def tell(line: dict[str, float]) -> bool:
@@ -64,6 +66,8 @@ def train(options: TrainOptions) -> int:
                 out().print(
                     f"           evaluated: return {line['evaluated']:.2f}, 95 % interval {line['low']:.2f} to {line['high']:.2f}"
                 )
+            if board is not None:
+                board.add(line)
             if pool is not None:
                 pool.add(trainer.model.layers(), len(trainer.curve))
             return bool(interrupt.code)
@@ -73,6 +77,10 @@ def train(options: TrainOptions) -> int:
     for name, path in trainer.files.items():
         block = f' block="{task.roles[name][0]}"' if name else ""
         say("trained", f'{path}: <autonomy policy="{path}"{block}>Learned</autonomy>', "bold green")
+    if options.episodes:
+        returns, label = trainer.evaluate(), str(trainer.n_decisions)
+        for path, found in record_extremes(task, trainer.decide, returns, folder, label).items():
+            say("recorded", f"{path}: return {found:.2f}; tussle replay {path}")
     return interrupt.code or OK
 
 

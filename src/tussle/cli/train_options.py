@@ -57,6 +57,16 @@ class TrainOptions(PluginOptions):
         ),
     ] = None
     resume: Annotated[bool, flag("--resume", "Continue from the checkpoint of the directory.")] = False
+    episodes: Annotated[
+        bool,
+        flag(
+            "--record-episodes",
+            "At the end, play evaluate_episodes episodes and record the best and the worst, for `tussle replay`.",
+        ),
+    ] = False
+    board: Annotated[
+        bool, flag("--tensorboard", "Write the curve for TensorBoard to DIR/tensorboard as well.")
+    ] = False
 
     def __post_init__(self) -> None:
         check_positive(minutes=self.minutes)

@@ -14,6 +14,9 @@ try:
 except ImportError:
     raise MissingExtraError("training needs PyTorch: pip install 'tussle[train]'") from None
 
+ROWS = 64
+"""With another number of rows, libraries of linear algebra may add in another order."""
+
 
 class ActorCritic:
     """The policy, a multilayer perceptron, and the critic, another one.
@@ -37,7 +40,10 @@ class ActorCritic:
 
     def distributions(self, obs: Any, mask: Any = None) -> list[Any]:
         """Distributions of the actions, independent of each other; levels that a mask (m, levels) excludes have the probability 0."""
-        out = self.policy(obs)
+        return self._distributions(self.policy(obs), mask)
+
+    def _distributions(self, out: Any, mask: Any) -> list[Any]:
+        """Those for what the policy returns."""
         if mask is not None:
             out = out.masked_fill(~mask, -1e9)
         if self.sizes:
@@ -45,8 +51,9 @@ class ActorCritic:
         return [torch.distributions.Normal(out, self.log_std.exp())]
 
     def most_likely(self, obs: Any, mask: Any = None) -> Any:
-        """Most likely actions, (m, n)."""
-        found = self.distributions(obs, mask)
+        """Most likely actions, (m, n). Each is, to the last bit, that of its row alone: the network runs on `ROWS` rows at a time."""
+        rows = nn.functional.pad(obs, (0, 0, 0, -len(obs) % ROWS)).split(ROWS)
+        found = self._distributions(torch.cat([self.policy(some) for some in rows])[: len(obs)], mask)
         return torch.stack([d.logits.argmax(-1) for d in found], -1) if self.sizes else found[0].mean
 
     def log_prob(self, distributions: list[Any], actions: Any) -> Any:

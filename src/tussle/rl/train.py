@@ -19,6 +19,7 @@ import numpy as np
 from tussle.errors import MissingExtraError, ParameterError, RecordError, listed
 from tussle.notebook_bar import Show, notebook_bar
 from tussle.rl.actor_critic import ActorCritic
+from tussle.rl.evaluation import interval, play_episodes
 from tussle.rl.policy_file import kept_file, write_policy
 from tussle.rl.settings import Settings
 from tussle.rl.swarm import Swarm
@@ -34,8 +35,6 @@ CURVE = ("minutes", "decisions", "episodes", "episode_return", "reward_per_decis
 """Columns of curve.csv."""
 EVALUATIONS = ("minutes", "decisions", "episodes", "episode_return", "low", "high")
 """Columns of evaluations.csv; low and high are the ends of the 95 % confidence interval of the mean."""
-FIRST_SEED = 9_000_001
-"""Of the episodes of evaluations, which no training plays: its seeds are hashes of 53 bits, or near `seed`."""
 
 
 @dataclass
@@ -255,21 +254,18 @@ class Trainer:
         batches = {name: rollout.decisions(s.discount, s.trace) for name, rollout in rollouts.items()}
         return batches, float(np.mean(ended)) if ended else np.nan, float(torch.cat(gained).mean())
 
+    def decide(self, swarm: Swarm) -> np.ndarray:
+        """The most likely actions, (W, A, n)."""
+        actions = self._idle(swarm)
+        for role in self.roles.values():
+            with torch.no_grad():
+                chosen = role.model.most_likely(role.obs(swarm.obs), role.mask(swarm)).numpy()
+            actions[:, role.agents, : role.n_actions] = chosen.reshape(len(actions), len(role.agents), -1)
+        return actions
+
     def evaluate(self) -> np.ndarray:
         """Play episodes with the most likely actions, and return the sum of rewards of each, (evaluate_episodes,)."""
-        n = self.settings.evaluate_episodes
-        with Swarm(self.task, n, autoreset="disabled") as swarm:
-            swarm.reset(FIRST_SEED)
-            actions, is_over, returns = self._idle(swarm), np.zeros(n, bool), np.zeros(n)
-            while not is_over.all():
-                for role in self.roles.values():
-                    with torch.no_grad():
-                        chosen = role.model.most_likely(role.obs(swarm.obs), role.mask(swarm)).numpy()
-                    actions[:, role.agents, : role.n_actions] = chosen.reshape(n, len(role.agents), -1)
-                swarm.step(actions)
-                returns += np.where(is_over, 0.0, swarm.rewards.sum(axis=1, dtype=float))
-                is_over |= swarm.over
-        return returns
+        return play_episodes(self.task, self.decide, self.settings.evaluate_episodes)
 
     # -- learning ----------------------------------------------------------------------------------------------------------
 
@@ -340,13 +336,10 @@ class Trainer:
 
     def _evaluated(self) -> dict[str, float]:
         """Evaluate, and note the mean with its interval."""
-        from scipy.stats import t as student_t  # it looks for PyTorch when it is imported
-
         returns = self.evaluate()
-        mean, n = float(returns.mean()), len(returns)
-        half = float(student_t.ppf(0.975, n - 1) * returns.std(ddof=1) / n**0.5) if n > 1 else np.inf
-        self.evaluations.append([*self.curve[-1][:2], float(n), mean, mean - half, mean + half])
-        return {"evaluated": mean, "low": mean - half, "high": mean + half}
+        mean, low, high = interval(returns)
+        self.evaluations.append([*self.curve[-1][:2], float(len(returns)), mean, low, high])
+        return {"evaluated": mean, "low": low, "high": high}
 
     # -- files -------------------------------------------------------------------------------------------------------------
 

@@ -77,3 +77,24 @@ def test_settings_come_from_a_file_and_the_command_line(tmp_path, monkeypatch):
     (tmp_path / "ppo.toml").write_text("world = 4\n")
     done = call("train", "tussle/RLSimple-v0", "--settings", "ppo.toml")
     assert "ppo.toml: there is no setting 'world' (did you mean 'worlds'?)" in " ".join(done.stderr.split())
+
+
+def test_the_curve_is_shown_in_tensorboard_and_episodes_are_recorded(tmp_path, monkeypatch):
+    accumulator = "tensorboard.backend.event_processing.event_accumulator"
+    read = pytest.importorskip(accumulator, reason=NEEDS["tensorboard"].reason).EventAccumulator
+    monkeypatch.chdir(tmp_path)
+    few = "--set", "evaluate_episodes=3", "--set", "decisions=16", "--set", "evaluate_every=1"
+    command = "train", "tussle/RLSimple-v0", "--out", "robot", "--worlds", 2, *few, "--minutes", 0.0001
+    done = call(*command, "--tensorboard", "--record-episodes")
+    assert done.returncode == 0, done.stderr
+    for name in ("best", "worst"):
+        (path,) = (tmp_path / "robot").glob(f"{name}-*")
+        assert f"tussle replay {path.relative_to(tmp_path)}" in " ".join(done.stderr.split())
+        assert call("analyze", path).returncode == 0
+    events = read(str(tmp_path / "robot" / "tensorboard")).Reload()
+    curve = (tmp_path / "robot" / "curve.csv").read_text().splitlines()
+    (shown,) = events.Scalars("reward_per_decision")
+    assert [shown.step, shown.value] == pytest.approx([float(x) for x in curve[1].split(",")][1::3])
+    assert {"evaluated", "low", "high"} <= set(events.Tags()["scalars"])
+    monkeypatch.setitem(sys.modules, "torch.utils.tensorboard", None)
+    assert "pip install 'tussle[tensorboard]'" in call(*command, "--resume", "--tensorboard").stderr

@@ -10,9 +10,20 @@ import pytest
 from flee import Flee
 from needs import NEEDS
 
-from tussle import Simulation
+from tussle import Simulation, load_run
 from tussle.errors import ParameterError, RecordError
-from tussle.rl import Computed, Dispersal, NearOrigin, Own, PredatorsAndPrey, Term, alive, register
+from tussle.rl import (
+    Computed,
+    Dispersal,
+    NearOrigin,
+    Own,
+    PredatorsAndPrey,
+    PreyEscape,
+    Term,
+    alive,
+    register,
+)
+from tussle.rl.evaluation import FIRST_SEED, record_extremes
 from tussle.rl.settings import Settings, read_training
 from tussle.stock import Learned
 
@@ -178,6 +189,20 @@ def test_evaluations_have_intervals_and_do_not_change_the_training(trainer_of, t
     plain.settings = Settings(worlds=2, decisions=8)
     plain.train(10.0, lambda line: n.append(line) or len(n) == 6)
     np.testing.assert_allclose(plain.model.layers()[0][0], weights, atol=1e-4)
+
+
+@pytest.mark.parametrize("task", [PreyEscape(time_limit=4.0), Dispersal(time_limit=20.0)])
+def test_the_best_and_the_worst_episode_are_those_of_the_evaluation(task, trainer_of, tmp_path):
+    """To the last bit, though they are played alone: with actions in ranges, and with levels and masks, where all games are alike."""
+    trainer = trainer_of(task, evaluate_episodes=7)
+    trainer.train(1e-9, lambda line: False)
+    returns = trainer.evaluate()
+    assert len(set(returns)) == (1 if task.has_mask else 7)
+    found = record_extremes(task, trainer.decide, returns, tmp_path, "5")
+    assert found == {tmp_path / "best-5": returns.max(), tmp_path / "worst-5": returns.min()}
+    assert load_run(tmp_path / "best-5").summary["seed"][0] - FIRST_SEED == returns.argmax()
+    with pytest.raises(RecordError, match="best-5"):
+        record_extremes(task, trainer.decide, returns, tmp_path, "5")
 
 
 @pytest.mark.parametrize("content", [b"", b"hello", b"PK\x03\x04"])
