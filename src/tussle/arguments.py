@@ -96,10 +96,25 @@ def _explained(function: Decorated, error: type[TussleError]) -> Decorated:
     return call  # type: ignore[return-value]
 
 
+def checked(function: Decorated) -> Decorated:
+    """A function that checks its arguments by their annotations before it runs, for what would be noticed later or never.
+
+    Its calls raise a `ParameterError`: an argument is of another type.
+    """
+
+    @functools.wraps(function)
+    def call(*args: Any, **kwargs: Any) -> Any:
+        if wrong := _better(function, args, kwargs, ParameterError):
+            raise wrong
+        return function(*args, **kwargs)
+
+    return call  # type: ignore[return-value]
+
+
 def _better(
     function: Callable[..., Any], args: Any, kwargs: Any, error: type[TussleError]
 ) -> TussleError | None:
-    """A better error, if an argument explains why a call failed."""
+    """An error that says which argument is wrong, if there is one."""
     name = type(args[0]).__name__ if function.__name__ == "__init__" else function.__name__
     signature = inspect.signature(function)
     known = [each for each in signature.parameters if each not in ("self", "cls")]
@@ -167,4 +182,4 @@ def _noun(kind: Any) -> str:
     return NOUNS.get(origin or kind) or f"a {kind.__name__}"
 
 
-__all__ = ["Array", "check_fields", "check_kind", "explained", "kinds_of"]
+__all__ = ["Array", "check_fields", "check_kind", "checked", "explained", "kinds_of"]

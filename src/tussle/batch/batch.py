@@ -15,7 +15,7 @@ from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tussle.arguments import explained
+from tussle.arguments import checked, explained
 from tussle.batch.design_points import (
     DesignPoint,
     build_points,
@@ -95,6 +95,7 @@ class Batch:
         MissionError: There is no such mission, or it cannot be played at one of the points.
     """
 
+    @checked
     def __init__(
         self,
         mission: str | Path | Mission | Callable[..., Mission],

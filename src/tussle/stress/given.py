@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from tussle.arguments import explained
+from tussle.arguments import checked
 from tussle.engine.simulation import Simulation
 from tussle.errors import MissingExtraError
 from tussle.mission import Mission
@@ -40,7 +40,7 @@ class GivenGame:
         return self.study.failing_mission(StressGame(self.seed))
 
 
-@explained
+@checked
 def given_games(
     mission: str | Path | Mission,
     specification: str | Function,

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from tussle.arguments import explained
+from tussle.arguments import checked, explained
 from tussle.batch import by_value
 from tussle.batch.batch import Batch
 from tussle.batch.design_points import check_variables, with_whole_numbers
@@ -80,6 +80,7 @@ class Stress:
         MissionError: The mission cannot be read.
     """
 
+    @checked
     def __init__(
         self,
         mission: str | Path | Mission,

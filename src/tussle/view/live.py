@@ -11,7 +11,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from tussle.arguments import explained
+from tussle.arguments import checked, explained
 from tussle.declare.messages import CustomKeyPress, Message, RemoveEntity, WorldPointClicked
 from tussle.documents import POSITIVE, check_argument, is_whole
 from tussle.engine.result import WorldResult
@@ -85,6 +85,7 @@ class Live:
         ParameterError: A value is not allowed.
     """
 
+    @checked
     def __init__(
         self,
         simulation: Simulation,
