@@ -133,6 +133,7 @@ def test_of_ids_with_gaps_the_nearest_are_told(hunted, tmp_path):
     table = recording.run.trajectory_table
     ids = np.asarray(table["id"])
     recording.run.trajectory_table = table.filter((ids < 5) | (ids > 9))
+    recording.events = [h for h in recording.events if not 5 <= h.id <= 9]
     with pytest.raises(ParameterError, match="there is no entity 6"):
         Trajectories(recording, Selection(entities=(6,)))
 
@@ -455,6 +456,43 @@ def test_who_is_left_is_counted_in_each_frame_and_deaths_are_marked_on_the_curve
         assert n == (recording.at(t).team == 1).sum()
         assert t == death.t
     assert legend_of(figure)[-1] == "captured"
+
+
+@pytest.mark.parametrize(
+    ("period", "selection"),
+    [
+        (0.7, Selection(start=4.0, end=17.0)),
+        (5.0, Selection()),
+        (5.0, Selection(teams=(1,))),
+        (100.0, Selection()),
+    ],
+)
+def test_who_is_left_does_not_depend_on_how_often_states_were_recorded(tmp_path, hunted, period, selection):
+    """All events are recorded, whatever the period: births and deaths are on the curve when they happen."""
+    seldom = Recording(record(hunt(n_prey=25, end=20.0), tmp_path / "hunt", seeds=(1, 2), period=period))
+    often = Recording(hunted)
+    tracks = Trajectories(seldom, selection)
+    low, high = tracks.frame_times[0], tracks.frame_times[-1]
+    known = left(Trajectories(often, Selection(selection.teams, (), low, high)))
+    found = left(tracks)
+    for one, other in zip(known.axes[0].lines, found.axes[0].lines, strict=True):
+        assert one.get_marker() == other.get_marker()
+        if one.get_marker() == "x":
+            assert one.get_xydata().tolist() == other.get_xydata().tolist()
+        else:
+            x, y = other.get_data()
+            at = np.searchsorted(x, one.get_xdata() + 1e-6, side="right") - 1
+            np.testing.assert_array_equal(np.asarray(y)[at], one.get_ydata())
+    assert legend_of(known) == legend_of(found)
+
+
+def test_one_that_lived_between_two_recorded_states_is_named(hunted):
+    recording = Recording(hunted)
+    table = recording.run.trajectory_table
+    recording.run.trajectory_table = table.filter(np.asarray(table["id"]) != 5)
+    assert Trajectories(recording).team_of[5] == 1
+    with pytest.raises(ParameterError, match="no state of entity 5 was recorded; it lived between"):
+        Trajectories(recording, Selection(entities=(5,)))
 
 
 def test_captures_are_counted_for_who_made_them_and_collisions_for_all(hunted, collided):
