@@ -276,15 +276,21 @@ def test_all_of_a_scene_in_space_lies_on_the_figure(hunted, tmp_path, place):
     assert max(box.y1 for box in boxes) <= figure.legends[0].get_window_extent().y0
 
 
-def test_the_maps_of_where_they_were_hold_all_the_time_they_were_there(hunted):
-    tracks = Trajectories(Recording(hunted))
+@pytest.mark.parametrize("selection", [Selection(), Selection(start=3.0, end=11.0)])
+@pytest.mark.parametrize("period", [None, 0.7, 5.0])
+def test_the_maps_of_where_they_were_hold_all_the_time_they_were_there(tmp_path, period, selection):
+    """From the first recorded state of the span to the last, however far these are apart; none is counted beyond."""
+    run = record(hunt(n_prey=25, end=20.0), tmp_path / "hunt", period=period)
+    tracks = Trajectories(Recording(run), selection)
     figure = density(tracks)
-    dt = 0.1
     images = [axes.images[0] for axes in figure.axes if axes.images]
     assert [axes.get_title(loc="left") for axes in figure.axes[:2]] == ["prey, late", "hunters"]
     for image, team in zip(images, (1, 2), strict=True):
-        n_states = np.repeat(tracks.team == team, np.diff(tracks.first)).sum()
-        assert np.ma.sum(image.get_array()) == pytest.approx(n_states * dt, rel=1e-9)
+        is_mine = np.repeat(tracks.team == team, np.diff(tracks.first))
+        n = np.bincount(tracks.frame[is_mine], minlength=len(tracks.frame_times))
+        lived = float((n[:-1] * np.diff(tracks.frame_times)).sum())
+        assert np.ma.sum(image.get_array()) == pytest.approx(lived, rel=1e-9)
+        assert lived <= n.max() * (tracks.frame_times[-1] - tracks.frame_times[0]) * (1.0 + 1e-9)
 
 
 def test_very_many_teams_share_one_map(tmp_path, monkeypatch, hunted):
