@@ -204,6 +204,29 @@ def test_with_points_no_quantile_pools_them():
     assert not {name for name in names_of(study([UAV], "lhs", 12)) if name.startswith("distribution")}
 
 
+def wins(n_points, hashes):
+    points = [{"paint": p} for p in range(n_points)]
+    scores = {2: np.full((30, n_points), 3.0), 3: np.random.default_rng(3).uniform(size=(30, n_points))}
+    scores[3][:, [run % n_points for run in hashes]] = 1.0
+    options = (
+        {"variables": [Choice("paint", tuple(range(n_points)))], "points": points} if n_points > 1 else {}
+    )
+    return asked(made_batch(scores, hashes=hashes, **options))
+
+
+@pytest.mark.parametrize("n_points", [1, 3])
+def test_copies_of_a_game_are_never_taken_for_skill(n_points):
+    found = wins(n_points, {run: f"{run % n_points:016x}" for run in range(30 * n_points)})
+    assert found["Is it luck?"].startswith("No: the games")
+    assert found["Is it luck?"].endswith("are all alike; their seeds change nothing.")
+    assert "differ by their seeds" not in found.get("What matters?", "")
+
+
+def test_what_is_known_of_a_point_is_told_beside_copies_at_others():
+    found = wins(3, dict.fromkeys(range(0, 90, 3), "0" * 16))
+    assert re.search(r"the mean of a point is known to ±\d", found["Is it luck?"])
+
+
 @pytest.mark.parametrize("last", [10.0, 1e4])
 @pytest.mark.parametrize("seed", range(4))
 def test_half_of_the_losses_had_happened_by_then_however_long_a_game_was(seed, last):

@@ -232,7 +232,12 @@ def _main_change(data: ReportData, response: Response, axis: FittedVariable, at:
 
 def _important_variables(data: ReportData, lead: Measure) -> str:
     if not data.axes:
-        return "Nothing was varied; games differ by their seeds alone." if data.n_good > 1 else ""
+        differ = (
+            "; games differ by their seeds alone"
+            if data.results.n_distinct > 1
+            else ", and the games are all alike"
+        )
+        return f"Nothing was varied{differ}." if data.n_good > 1 else ""
     effects = data.effects(lead)
     parts = [
         (e.variable, e.first_order, e.first_low, e.first_high) for e in effects if e.first_order is not None
@@ -267,12 +272,12 @@ def _luck(data: ReportData, lead: Measure) -> str:
     n = min(mean.n for mean in means)
     if n < 2:
         return "That cannot be told: not every point was played twice. More seeds (--runs) tell."
-    halves = [(mean.high - mean.low) / 2.0 for mean in means]
+    if results.n_distinct == len(results.points):
+        return f"No: the games{' of a point' if data.has_points else ''} are all alike; their seeds change nothing."
+    halves = [(mean.high - mean.low) / 2.0 for mean in means if math.isfinite(mean.low)]  # not of copies
     known = f"±{_width(lead, float(np.median(halves)))} with {count(n, 'seed')}"
     if not data.has_points:
         return _luck_of_seeds(data, lead, known)
-    if results.n_distinct == len(results.points):
-        return "No: the games of a point are all alike; their seeds change nothing."
     spread = math.sqrt(float(np.mean([mean.sd**2 for mean in means])))
     part = next((e.first_order for e in data.effects(lead) if e.variable == "seed"), None)
     prefix = ""
