@@ -96,7 +96,7 @@ class PairedComparison:
         n_greater: Pairs in which b has more.
         n_less: Pairs in which b has less.
         n_equal: Pairs in which both have the same.
-        p: Of the exact sign test, two-sided.
+        p: Of the exact sign test, two-sided, in which a seed counts once, with the sign of most of its pairs.
     """
 
     quantity: str
