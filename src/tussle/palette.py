@@ -40,7 +40,7 @@ def colour_in(text: str) -> str | None:
 def team_colours(blocks: Iterable[tuple[int, str | None]]) -> dict[int, str]:
     """Colour "#rrggbb" of each team of a mission, in the viewer, films, plots and reports alike.
 
-    A team has the colour of its first block with a `<color>`, else a colour of the palette by its number.
+    A team has the colour of its first block with a `<color>`, else that of its number in the palette, or the next that no other team has.
 
     Args:
         blocks: Team and text of the `<color>` of each block; None without one.
@@ -48,7 +48,18 @@ def team_colours(blocks: Iterable[tuple[int, str | None]]) -> dict[int, str]:
     found: dict[int, str | None] = {}
     for team, text in blocks:
         found[team] = found.get(team) or (None if text is None else colour_in(text))
-    return {team: colour or colour_of(team) for team, colour in sorted(found.items())}
+    by_team = dict(sorted(found.items()))
+    taken = set(by_team.values())
+    for team, colour in by_team.items():  # first those that get the colour of their number
+        if colour is None and (own := colour_of(team)) not in taken:
+            by_team[team] = own
+            taken.add(own)
+    for team, colour in by_team.items():
+        if colour is None:
+            order = [colour_of(team + i) for i in range(len(TEAM_COLOURS))]
+            by_team[team] = next((each for each in order if each not in taken), order[0])
+            taken.add(by_team[team])
+    return {team: colour for team, colour in by_team.items() if colour}
 
 
 def on_paper(colour: str) -> str:

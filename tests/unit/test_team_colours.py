@@ -6,13 +6,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from tussle import Recorder, Simulation
 from tussle.batch import Batch, load_batch
 from tussle.batch.report import write_report
 from tussle.batch.report.report_data import ReportData
 from tussle.mission import read_mission, shipped_missions
-from tussle.palette import PAPER, TEAM_COLOURS, hex_of, luminance, on_paper, rgb_of, team_colours
+from tussle.palette import PAPER, TEAM_COLOURS, colour_of, hex_of, luminance, on_paper, rgb_of, team_colours
 from tussle.view import Live, Recording
 from tussle.view.page.document import game_document
 from tussle.view.plots import maps, sheet
@@ -106,3 +108,20 @@ def test_a_colour_that_is_not_seen_on_a_page_becomes_a_shade_of_it(colour):
 @pytest.mark.parametrize("colour", [*TEAM_COLOURS, "#ff0000", "#00ff00", "#0000ff", "#00ffff", "#ffa000"])
 def test_a_colour_that_is_seen_stays(colour):
     assert on_paper(colour) == colour
+
+
+@given(
+    st.lists(st.tuples(st.integers(-3, 10**6), st.sampled_from([None, "10 20 30", "0 114 178"])), max_size=12)
+)
+def test_teams_differ_while_the_palette_lasts(blocks):
+    found = team_colours(blocks)
+    written = dict.fromkeys(team for team, text in blocks if text)
+    free = [team for team in found if team not in written]
+    own = {found[team] for team in free}
+    assert len(own) >= min(len(free), len(TEAM_COLOURS) - 1)
+    if len(free) < len(TEAM_COLOURS):
+        assert not own & {found[team] for team in written}
+    assert team_colours(reversed(blocks)).keys() == found.keys()
+    for team in free:  # who comes first with its number keeps the colour of its number
+        taken = {found[t] for t in written} | {colour_of(t) for t in free if t < team}
+        assert colour_of(team) in taken or found[team] == colour_of(team)

@@ -78,25 +78,29 @@ def with_values(
 
 
 def distinct_games(runs: pa.Table, failed: np.ndarray, quantities: Collection[np.ndarray] = ()) -> np.ndarray:
-    """A number for each run, (n_runs,): the same for runs of one point that ended in the same state and have the same results.
+    """A number for each run, (n_runs,): one for all runs of a point where they end in the same state with the same results, else its own.
 
-    These are copies of one game. Where the state is the same, the results may differ: a radio loses other messages, which nobody needs.
+    Then nothing in these games depends on the seed: they are copies of one game. Where only some are alike, they are so by chance, as
+    most games without a rare event are, or games in which nobody is left; each of them is an observation. Where the state is the
+    same, the results may differ: a radio loses other messages, which nobody needs.
 
     Args:
         runs: One row per run.
         failed: Which runs failed, (n_runs,): none of them is a copy.
         quantities: Each result of the runs, (n_runs,).
     """
+    game, point = np.arange(len(failed)), runs["point"].to_numpy()
+    if failed.all():
+        return game
     text = pc.fill_null(runs["state_hash"].combine_chunks(), "").dictionary_encode()
     hashes = text.indices.to_numpy().astype(np.int64)
-    is_known = ~failed & (np.array([*text.dictionary.to_pylist(), ""], dtype=object)[hashes] != "")
-    own = np.where(is_known, 0, 1 + np.arange(len(failed)))  # apart from all others
-    keys = np.stack([runs["point"].to_numpy().astype(np.int64), hashes, own], axis=1)
-    game, size = np.unique(keys, axis=0, return_inverse=True, return_counts=True)[1:]
-    game = np.asarray(game).ravel()
-    alike = np.flatnonzero(size[game] > 1)
-    if len(alike) and quantities:
-        bits = [np.asarray(values, np.float64)[alike].view(np.int64) for values in quantities]
-        known = np.unique(np.stack([game[alike], *bits], axis=1), axis=0, return_inverse=True)[1]
-        game[alike] = game.max() + 1 + np.asarray(known).ravel()
+    is_known = np.array([*text.dictionary.to_pylist(), ""], dtype=object)[hashes] != ""
+    played = np.flatnonzero(~failed)
+    played = played[np.argsort(point[played], kind="stable")]
+    first = np.flatnonzero(np.diff(point[played], prepend=-1))  # of each point
+    are_copies = np.logical_and.reduceat(is_known[played], first)
+    for bits in (hashes, *(np.asarray(values, np.float64).view(np.int64) for values in quantities)):
+        are_copies &= np.minimum.reduceat(bits[played], first) == np.maximum.reduceat(bits[played], first)
+    sizes = np.diff(first, append=len(played))
+    game[played] = np.where(np.repeat(are_copies, sizes), np.repeat(played[first], sizes), played)
     return np.asarray(np.unique(game, return_inverse=True)[1]).ravel()

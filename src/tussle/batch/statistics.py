@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
 from statistics import NormalDist
 from typing import Any
 
@@ -97,7 +96,7 @@ class PairedComparison:
         n_greater: Pairs in which b has more.
         n_less: Pairs in which b has less.
         n_equal: Pairs in which both have the same.
-        p: Of the exact sign test, two-sided.
+        p: Of the exact sign test, two-sided, in which a seed counts once, with the sign of most of its pairs.
     """
 
     quantity: str
@@ -133,13 +132,24 @@ def scipy_package() -> Any:
 # -- shares ---------------------------------------------------------------------------------------------------------------
 
 
-@cache
 def wilson(k: float, n: float) -> tuple[float, float]:
-    """Wilson's interval of a share, k of n, which are rounded to whole numbers; NaN for n = 0."""
+    """Wilson's interval of a share, k of n; NaN for n = 0. Numbers of runs that stand for others need not be whole."""
     if n <= 0:
         return math.nan, math.nan
-    found = scipy_package().stats.binomtest(round(k), round(n)).proportion_ci(LEVEL, method="wilson")
-    return float(found.low), float(found.high)
+    return _wilson(k / n, NormalDist().inv_cdf(0.5 + LEVEL / 2.0) ** 2 / n)
+
+
+def _wilson(share: float, ratio: float) -> tuple[float, float]:
+    """Wilson's interval.
+
+    Args:
+        share: The share.
+        ratio: Squared quantile of the normal distribution over the number of runs.
+    """
+    centre = (share + ratio / 2.0) / (1.0 + ratio)
+    half = math.sqrt(max(ratio * share * (1.0 - share), 0.0) + ratio**2 / 4.0) / (1.0 + ratio)
+    low, high = max(centre - half, 0.0), min(centre + half, 1.0)
+    return low if share > 0.0 else 0.0, high if share < 1.0 else 1.0  # which rounding would miss
 
 
 def share_of(
@@ -262,9 +272,7 @@ def within_one(mean: float, low: float, high: float, n: int) -> tuple[float, flo
         ratio = NormalDist().inv_cdf(0.5 + LEVEL / 2.0) ** 2 / n
     else:
         return math.nan, math.nan
-    centre = (mean + ratio / 2.0) / (1.0 + ratio)
-    half = math.sqrt(max(ratio * spread, 0.0) + ratio**2 / 4.0) / (1.0 + ratio)
-    return max(centre - half, 0.0), min(centre + half, 1.0)
+    return _wilson(mean, ratio)
 
 
 def stratified_interval(
@@ -434,6 +442,8 @@ def paired_difference(
 ) -> PairedComparison:
     """The second side of pairs minus the first.
 
+    The sign test counts each block once, with the sign that most of its pairs have.
+
     Args:
         quantity: What is compared.
         names: Of a and b.
@@ -441,14 +451,18 @@ def paired_difference(
         b: Value of each pair's second run, (n,).
         blocks: Number of the block that each pair belongs to, (n,); None where pairs are independent.
         strata: Number of the two points that each pair belongs to, (n,); None for one pair of points.
-        are_copies: The pairs of a block are copies of one pair, so that the sign test counts each block once.
+        are_copies: The pairs of a block are copies of one pair, so that no block goes over several points.
     """
     is_known = np.isfinite(a) & np.isfinite(b)
     a, b = a[is_known], b[is_known]
     more, own, strata = b - a, *(None if by is None else by[is_known] for by in (blocks, strata))
     n_greater, n_less = int((more > 0.0).sum()), int((more < 0.0).sum())
     mean = mean_of(quantity, more, own, strata, are_copies=are_copies)
-    signs = np.sign(more if own is None or not are_copies else more[np.unique(own, return_index=True)[1]])
+    signs = np.sign(more)
+    if (
+        own is not None
+    ):  # its pairs share their luck: a block is one observation, however many points it goes over
+        signs = np.sign(np.bincount(np.unique(own, return_inverse=True)[1], signs))
     mean_a, mean_b = (
         math.nan if not len(v) else float(v.mean()) if strata is None else _over_strata(v, strata)[0]
         for v in (a, b)

@@ -8,7 +8,7 @@ from html import escape
 from typing import Any
 
 from tussle.declare.displays import counted, line, listing, page, shortened, table
-from tussle.palette import colour_of
+from tussle.palette import team_colours
 
 SIZE, MARGIN = 220.0, 14.0
 """Side of the picture, and the free space along it [pixels]."""
@@ -85,6 +85,8 @@ def start_picture(blocks: Iterable[Any]) -> str:
 
     The region is that of uniform placement, or two standard deviations of normal placement. Where a float cannot hold the distances, "".
     """
+    blocks = list(blocks)
+    colours = team_colours((block.team, None) for block in blocks)
     drawn = [(block, _half_width(block)) for block in blocks if block.count][:MAX_DRAWN]
     if not drawn:
         return ""
@@ -100,7 +102,7 @@ def start_picture(blocks: Iterable[Any]) -> str:
     shapes = []
     for block, half_width in drawn:
         x, y = SIZE / 2.0 + (block.position[0] - left) * scale, SIZE / 2.0 - (block.position[1] - top) * scale
-        shapes.append(_shape(block, x, y, half_width[0] * scale, half_width[1] * scale))
+        shapes.append(_shape(block, colours[block.team], x, y, half_width[0] * scale, half_width[1] * scale))
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" width="{SIZE:g}" height="{SIZE:g}" viewBox="0 0 {SIZE:g} {SIZE:g}" role="img" '
         f'aria-label="Start of {counted(len(drawn), "block")}, from above">'
@@ -118,8 +120,7 @@ def _half_width(block: Any) -> tuple[float, float]:
     return 2.0 * math.sqrt(block.variance[0]), 2.0 * math.sqrt(block.variance[1])
 
 
-def _shape(block: Any, x: float, y: float, half_x: float, half_y: float) -> str:
-    colour = colour_of(block.team)
+def _shape(block: Any, colour: str, x: float, y: float, half_x: float, half_y: float) -> str:
     style = f'fill="{colour}" fill-opacity=".25" stroke="{colour}"'
     region = f'<ellipse cx="{x:.1f}" cy="{y:.1f}" rx="{half_x:.1f}" ry="{half_y:.1f}" {style}/>'
     if block.placement == "uniform":

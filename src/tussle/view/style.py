@@ -43,9 +43,9 @@ _MOTION_WORDS: Mapping[str, tuple[str, ...]] = {
 class Style:
     """Colours and models of a mission's entities.
 
-    A block has its `<color>`, else the colour of its team: that of the first block with one, else a colour of the palette by the team's
-    number. The model is the one nearest to `visual_model`, else a box of its own lengths for entities that are boxes, else one that
-    suits the motion model. `visual_rpy` is ignored: it turns the meshes of SCRIMMAGE, and these point forward.
+    A block has its `<color>`, else the colour of its team: that of the first block with one, else a colour of the palette that no other
+    team has, while there is one. The model is the one nearest to `visual_model`, else a box of its own lengths for entities that are
+    boxes, else one that suits the motion model. `visual_rpy` is ignored: it turns the meshes of SCRIMMAGE, and these point forward.
 
     Args:
         blocks: Names of the blocks.

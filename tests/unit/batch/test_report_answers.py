@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import dataclasses
 import re
 
 import numpy as np
+import pyarrow.compute as pc
 import pytest
 from made_batches import made_batch
 from reported_batches import names_of, texts_of
 
-from tussle.batch.report.answers import answers
+from tussle.batch.report.answers import _half_lost, answers
 from tussle.batch.report.report_data import ReportData
 from tussle.batch.report.sections import _means
 from tussle.batch.report.variable_sections import _surfaces, effects, maps, strengths
@@ -200,3 +202,58 @@ def test_with_points_no_quantile_pools_them():
     means = [mean.value for mean in rows.results.means_by_point("Guard.share")]
     assert [float(cell) for cell in row[4:6]] == pytest.approx([min(means), max(means)], abs=5e-4)
     assert not {name for name in names_of(study([UAV], "lhs", 12)) if name.startswith("distribution")}
+
+
+def wins(n_points, hashes):
+    points = [{"paint": p} for p in range(n_points)]
+    scores = {2: np.full((30, n_points), 3.0), 3: np.random.default_rng(3).uniform(size=(30, n_points))}
+    scores[3][:, [run % n_points for run in hashes]] = 1.0
+    options = (
+        {"variables": [Choice("paint", tuple(range(n_points)))], "points": points} if n_points > 1 else {}
+    )
+    return asked(made_batch(scores, hashes=hashes, **options))
+
+
+@pytest.mark.parametrize("n_points", [1, 3])
+def test_copies_of_a_game_are_never_taken_for_skill(n_points):
+    found = wins(n_points, {run: f"{run % n_points:016x}" for run in range(30 * n_points)})
+    assert found["Is it luck?"].startswith("No: the games")
+    assert found["Is it luck?"].endswith("are all alike; their seeds change nothing.")
+    assert "differ by their seeds" not in found.get("What matters?", "")
+
+
+def test_what_is_known_of_a_point_is_told_beside_copies_at_others():
+    found = wins(3, dict.fromkeys(range(0, 90, 3), "0" * 16))
+    assert re.search(r"the mean of a point is known to ±\d", found["Is it luck?"])
+
+
+@pytest.mark.parametrize("last", [10.0, 1e4])
+@pytest.mark.parametrize("seed", range(4))
+def test_half_of_the_losses_had_happened_by_then_however_long_a_game_was(seed, last):
+    rng = np.random.default_rng(seed)
+    times, alive = [], {}
+    for run in range(7):
+        own = np.sort(rng.choice(np.arange(1, 40), size=rng.integers(0, 9), replace=False)) / 4.0
+        times += own.tolist()
+        alive[run] = [(1, 0.0, 20), *((1, t, 19 - i) for i, t in enumerate(own.tolist())), (2, 0.0, 5)]
+    alive[6].append((2, last, 4))  # the end of the longest game
+    metrics = {"Guard.share": {None: rng.uniform(size=(7, 1))}}
+    text = asked(made_batch({}, metrics=metrics, alive=alive))["When did it go wrong?"]
+    (half,) = re.findall(r"Prey lost [\d.]+ a game, half of them by ([\d.]+) s\.", text)
+    assert float(half) == np.quantile(times, 0.5, method="inverted_cdf")
+
+
+def test_no_time_is_told_of_losses_that_births_hide():
+    """One dies and one is born in the step at 20 s: the number that is left does not tell."""
+    alive = {run: [(1, 0.0, 9), (1, 20.0, 9), (1, 30.0, 8), (2, 0.0, 5)] for run in range(3)}
+    metrics = {"Guard.share": {None: np.full((3, 1), 0.5)}}
+    stored = made_batch({}, metrics=metrics, alive=alive)
+    value = pc.if_else(
+        pc.and_(pc.equal(stored.table["metric"], "start"), pc.equal(stored.table["team"], 1)),
+        10.0,
+        stored.table["value"],
+    )
+    table = stored.table.set_column(stored.table.schema.names.index("value"), "value", value)
+    results = Results(dataclasses.replace(stored, table=table))
+    assert results.means(["lost[1]"])[0].value == 2.0
+    assert np.isnan(_half_lost(results, 1))

@@ -16,7 +16,7 @@ from made_batches import START, made_batch, write_batch
 
 from tussle.batch import Batch, InProcess, load_batch
 from tussle.batch.results import Results
-from tussle.batch.statistics import mean_interval, wilson
+from tussle.batch.statistics import mean_interval, mean_of, wilson
 from tussle.batch.store import RESULTS
 from tussle.batch.variables import Choice, Range
 from tussle.errors import ParameterError
@@ -348,25 +348,59 @@ def test_runs_with_one_final_state_and_other_results_are_no_copies():
     same = dict.fromkeys(range(8), "a" * 16)
     zeros = np.zeros((8, 1))
     results = Results(made_batch({2: zeros, 3: zeros}, metrics={"Radio.lost": {None: lost}}, hashes=same))
-    assert results.n_distinct == 5
+    assert results.n_distinct == 8
     mean = results.means(["Radio.lost"])[0]
     assert (mean.n, mean.low < mean.value < mean.high) == (6, True)
 
 
-def test_intervals_of_points_and_comparisons_count_distinct_games():
+def test_games_that_are_alike_by_chance_are_observations():
+    """Most games without a rare event end in one state; those in which nobody is left do so in each step in which the last one dies."""
+    happened = (np.arange(100) % 20 == 7).astype(float)[:, None]
+    scores = {2: happened, 3: np.zeros((100, 1))}
+    hashes = {run: f"{int(happened[run, 0]):016x}" for run in range(100)}
+    alike, apart = Results(made_batch(scores, hashes=hashes)), Results(made_batch(scores))
+    assert alike.n_distinct == 100
+    assert alike.notes == []
+    assert alike.shares() == apart.shares()
+    assert (alike.shares()[0].low, alike.shares()[0].high) == wilson(5, 100)
+    assert alike.means(["score[2]"]) == apart.means(["score[2]"])
+
+
+def test_copies_at_one_point_take_nothing_from_another():
     variable = Choice("tactic", ("keep", "switch"))
-    luck = np.random.default_rng(1).normal(size=(5, 1))
-    scores = {2: np.tile(np.hstack([luck, luck + 1.0]), (4, 1)), 3: np.zeros((20, 2))}
-    hashes = {run: f"{run % 10:016x}" for run in range(40)}  # four copies of five seeds
+    luck = np.random.default_rng(1).normal(size=(20, 1))
+    scores = {2: np.hstack([np.ones((20, 1)), luck]), 3: np.zeros((20, 2))}
+    hashes = dict.fromkeys(range(0, 40, 2), "0" * 16)  # of the first point
     options = {"variables": [variable], "points": [{"tactic": "keep"}, {"tactic": "switch"}]}
-    copied = Results(made_batch(scores, hashes=hashes, **options))
-    once = Results(made_batch({t: v[:5] for t, v in scores.items()}, **options))
-    assert copied.n_distinct == 10
-    for many, few in zip(copied.means_by_point("score[2]"), once.means_by_point("score[2]"), strict=True):
-        np.testing.assert_allclose([many.low, many.high], [few.low, few.high])
-    many, few = (r.compare("score[2]", "tactic=keep", "tactic=switch") for r in (copied, once))
-    assert (many.n, few.n) == (20, 5)
-    assert many.p == few.p == pytest.approx(0.0625)
+    copied, once = (
+        Results(made_batch(scores, hashes=hashes, **options)),
+        Results(made_batch(scores, **options)),
+    )
+    assert copied.n_distinct == 21
+    same, other = copied.means_by_point("score[2]")
+    assert np.isnan(same.low)
+    assert [other.low, other.high] == pytest.approx([(m := once.means_by_point("score[2]")[1]).low, m.high])
+    assert copied.compare("score[2]", "tactic=keep", "tactic=switch") == once.compare(
+        "score[2]", "tactic=keep", "tactic=switch"
+    )
+
+
+@pytest.mark.parametrize("n_levels", [1, 2, 9])
+@pytest.mark.parametrize("differs_at", [2, 9, 15])
+def test_a_variable_without_effect_makes_no_comparison_surer(n_levels, differs_at):
+    """The pairs of one seed at several points share their luck: they are one sign, and one value of the interval."""
+    variables = [Choice("tactic", ("keep", "switch")), Choice("paint", tuple(range(n_levels)))]
+    points = [{"tactic": t, "paint": p} for t in ("keep", "switch") for p in range(n_levels)]
+    luck = np.random.default_rng(2).normal(size=(15, 1))
+    more = luck + np.where(np.arange(15) < differs_at, 1.0, 0.0)[:, None]
+    scores = {2: np.repeat(np.hstack([luck, more]), n_levels, axis=1), 3: np.zeros((15, 2 * n_levels))}
+    found = Results(made_batch(scores, variables=variables, points=points)).compare(
+        "score[2]", "tactic=keep", "tactic=switch"
+    )
+    assert (found.n_greater, found.n_equal) == (differs_at * n_levels, (15 - differs_at) * n_levels)
+    assert found.p == 2.0 ** (1 - differs_at)
+    alone = mean_of("", (more - luck).ravel())
+    assert [found.low, found.high] == pytest.approx([alone.low, alone.high], abs=1e-12)
 
 
 def test_a_game_without_chance_gives_one_distinct_game():

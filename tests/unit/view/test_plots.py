@@ -133,6 +133,7 @@ def test_of_ids_with_gaps_the_nearest_are_told(hunted, tmp_path):
     table = recording.run.trajectory_table
     ids = np.asarray(table["id"])
     recording.run.trajectory_table = table.filter((ids < 5) | (ids > 9))
+    recording.events = [h for h in recording.events if not 5 <= h.id <= 9]
     with pytest.raises(ParameterError, match="there is no entity 6"):
         Trajectories(recording, Selection(entities=(6,)))
 
@@ -275,15 +276,21 @@ def test_all_of_a_scene_in_space_lies_on_the_figure(hunted, tmp_path, place):
     assert max(box.y1 for box in boxes) <= figure.legends[0].get_window_extent().y0
 
 
-def test_the_maps_of_where_they_were_hold_all_the_time_they_were_there(hunted):
-    tracks = Trajectories(Recording(hunted))
+@pytest.mark.parametrize("selection", [Selection(), Selection(start=3.0, end=11.0)])
+@pytest.mark.parametrize("period", [None, 0.7, 5.0])
+def test_the_maps_of_where_they_were_hold_all_the_time_they_were_there(tmp_path, period, selection):
+    """From the first recorded state of the span to the last, however far these are apart; none is counted beyond."""
+    run = record(hunt(n_prey=25, end=20.0), tmp_path / "hunt", period=period)
+    tracks = Trajectories(Recording(run), selection)
     figure = density(tracks)
-    dt = 0.1
     images = [axes.images[0] for axes in figure.axes if axes.images]
     assert [axes.get_title(loc="left") for axes in figure.axes[:2]] == ["prey, late", "hunters"]
     for image, team in zip(images, (1, 2), strict=True):
-        n_states = np.repeat(tracks.team == team, np.diff(tracks.first)).sum()
-        assert np.ma.sum(image.get_array()) == pytest.approx(n_states * dt, rel=1e-9)
+        is_mine = np.repeat(tracks.team == team, np.diff(tracks.first))
+        n = np.bincount(tracks.frame[is_mine], minlength=len(tracks.frame_times))
+        lived = float((n[:-1] * np.diff(tracks.frame_times)).sum())
+        assert np.ma.sum(image.get_array()) == pytest.approx(lived, rel=1e-9)
+        assert lived <= n.max() * (tracks.frame_times[-1] - tracks.frame_times[0]) * (1.0 + 1e-9)
 
 
 def test_very_many_teams_share_one_map(tmp_path, monkeypatch, hunted):
@@ -455,6 +462,43 @@ def test_who_is_left_is_counted_in_each_frame_and_deaths_are_marked_on_the_curve
         assert n == (recording.at(t).team == 1).sum()
         assert t == death.t
     assert legend_of(figure)[-1] == "captured"
+
+
+@pytest.mark.parametrize(
+    ("period", "selection"),
+    [
+        (0.7, Selection(start=4.0, end=17.0)),
+        (5.0, Selection()),
+        (5.0, Selection(teams=(1,))),
+        (100.0, Selection()),
+    ],
+)
+def test_who_is_left_does_not_depend_on_how_often_states_were_recorded(tmp_path, hunted, period, selection):
+    """All events are recorded, whatever the period: births and deaths are on the curve when they happen."""
+    seldom = Recording(record(hunt(n_prey=25, end=20.0), tmp_path / "hunt", seeds=(1, 2), period=period))
+    often = Recording(hunted)
+    tracks = Trajectories(seldom, selection)
+    low, high = tracks.frame_times[0], tracks.frame_times[-1]
+    known = left(Trajectories(often, Selection(selection.teams, (), low, high)))
+    found = left(tracks)
+    for one, other in zip(known.axes[0].lines, found.axes[0].lines, strict=True):
+        assert one.get_marker() == other.get_marker()
+        if one.get_marker() == "x":
+            assert one.get_xydata().tolist() == other.get_xydata().tolist()
+        else:
+            x, y = other.get_data()
+            at = np.searchsorted(x, one.get_xdata() + 1e-6, side="right") - 1
+            np.testing.assert_array_equal(np.asarray(y)[at], one.get_ydata())
+    assert legend_of(known) == legend_of(found)
+
+
+def test_one_that_lived_between_two_recorded_states_is_named(hunted):
+    recording = Recording(hunted)
+    table = recording.run.trajectory_table
+    recording.run.trajectory_table = table.filter(np.asarray(table["id"]) != 5)
+    assert Trajectories(recording).team_of[5] == 1
+    with pytest.raises(ParameterError, match="no state of entity 5 was recorded; it lived between"):
+        Trajectories(recording, Selection(entities=(5,)))
 
 
 def test_captures_are_counted_for_who_made_them_and_collisions_for_all(hunted, collided):

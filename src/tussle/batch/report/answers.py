@@ -232,7 +232,12 @@ def _main_change(data: ReportData, response: Response, axis: FittedVariable, at:
 
 def _important_variables(data: ReportData, lead: Measure) -> str:
     if not data.axes:
-        return "Nothing was varied; games differ by their seeds alone." if data.n_good > 1 else ""
+        differ = (
+            "; games differ by their seeds alone"
+            if data.results.n_distinct > 1
+            else ", and the games are all alike"
+        )
+        return f"Nothing was varied{differ}." if data.n_good > 1 else ""
     effects = data.effects(lead)
     parts = [
         (e.variable, e.first_order, e.first_low, e.first_high) for e in effects if e.first_order is not None
@@ -267,12 +272,12 @@ def _luck(data: ReportData, lead: Measure) -> str:
     n = min(mean.n for mean in means)
     if n < 2:
         return "That cannot be told: not every point was played twice. More seeds (--runs) tell."
-    halves = [(mean.high - mean.low) / 2.0 for mean in means]
+    if results.n_distinct == len(results.points):
+        return f"No: the games{' of a point' if data.has_points else ''} are all alike; their seeds change nothing."
+    halves = [(mean.high - mean.low) / 2.0 for mean in means if math.isfinite(mean.low)]  # not of copies
     known = f"±{_width(lead, float(np.median(halves)))} with {count(n, 'seed')}"
     if not data.has_points:
         return _luck_of_seeds(data, lead, known)
-    if results.n_distinct == len(results.points):
-        return "No: the games of a point are all alike; their seeds change nothing."
     spread = math.sqrt(float(np.mean([mean.sd**2 for mean in means])))
     part = next((e.first_order for e in data.effects(lead) if e.variable == "seed"), None)
     prefix = ""
@@ -313,16 +318,28 @@ def _losses(data: ReportData) -> Iterator[str]:
     results = data.results
     lost = [(team, mean) for team in results.diminished for mean in results.means([f"lost[{team}]"])]
     for team, mean in sorted(lost, key=lambda pair: -pair[1].value)[:2]:
-        curve = results.survival(team)
-        dropped = curve.mean[0] - curve.mean
-        half = float(curve.t[int(np.argmax(dropped >= dropped[-1] / 2.0))]) if dropped[-1] > 0.0 else math.nan
-        when = f", half of them by {number(round(half, 1))} s" if math.isfinite(half) else ""
+        half = _half_lost(results, team)
+        when = f", half of them by {number(half)} s" if math.isfinite(half) else ""
         yield f"{capital(data.name_of(team))} lost {estimate(mean.value)} a game{when}."
     if not lost:
         yield "Nobody was lost."
     if results.n_failed:
         failed = results.failed()
         yield f"{count(results.n_failed, 'game')} failed, the first is run {failed['run'][0].as_py()}."
+
+
+def _half_lost(results: Results, team: int) -> float:
+    """Time by which half of what a team lost in all games was lost [s]; NaN where births in the same steps hide losses."""
+    lost = results.quantity(f"lost[{team}]")
+    run, t, of_team, left = (results.alive[name].to_numpy() for name in ("run", "t", "team", "alive"))
+    rows = np.flatnonzero((of_team == team) & np.isin(run, results.runs["run"].to_numpy()[np.isfinite(lost)]))
+    rows = rows[np.lexsort((t[rows], run[rows]))]
+    falls = np.where(run[rows][1:] == run[rows][:-1], left[rows][:-1] - left[rows][1:], 0).clip(0)
+    if falls.sum() != np.nansum(lost):
+        return math.nan
+    order = np.argsort(t[rows][1:], kind="stable")
+    so_far = np.cumsum(falls[order])
+    return float(t[rows][1:][order][np.searchsorted(so_far, so_far[-1] / 2.0)])
 
 
 def _extreme_game(data: ReportData, lead: Measure) -> tuple[str, str]:

@@ -256,10 +256,11 @@ def left(data: ReportData) -> Section:
 
 def _left(data: ReportData, teams: Sequence[int]) -> Plot:
     names = ", ".join(map(data.name_of, teams)) if len(teams) <= 4 else f"{len(teams)} teams"
+    band = "" if len(data.points) > 1 else " Band: 95 % interval of the mean at each time."
     return Plot(
         f"left-{'-'.join(map(str, teams))}",
         f"{names} left over time",
-        "Mean number of each team that is left. Band: 95 % interval of the mean at each time. Games that ended keep their last number.",
+        f"Mean number of each team that is left.{band} Games that ended keep their last number.",
         lambda: plots.over_time(
             [_curve(data, t, None, data.name_of(t), data.results.colours[t], "-") for t in teams],
             f"{names} left" if len(teams) == 1 else "number left",
@@ -274,7 +275,7 @@ def _left_by_point(data: ReportData, team: int) -> Plot:
     return Plot(
         f"left-{team}-by-point",
         f"{name} left, by {data.results.variables[0].name if len(data.results.variables) == 1 else 'point'}",
-        "Mean number left at each point, with its 95 % interval.",
+        "Mean number left at each point. Band: 95 % interval of the mean at each time.",
         lambda: plots.over_time(
             [_curve(data, team, i, data.point_name(i), ramp[i], dashes[i]) for i in range(n)], f"{name} left"
         ),

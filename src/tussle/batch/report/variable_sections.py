@@ -319,12 +319,18 @@ def differences(data: ReportData) -> Section:
     columns = numbers(
         "pairs", "mean before", "after", "difference", "95 % interval", "more / less / equal", "p"
     )
-    paired = "Pairs are games with the same seed and otherwise the same values."
+    paired, once = (
+        "Pairs are games with the same seed and otherwise the same values.",
+        ", in which a seed counts once",
+    )
     if data.results.info.get("independent"):
-        paired = "Pairs are games with otherwise the same values, in the order of their seeds; each has a seed of its own."
+        paired, once = (
+            "Pairs are games with otherwise the same values, in the order of their seeds; each has a seed of its own.",
+            "",
+        )
     caption = (
-        f"{paired} more / less / equal: number of pairs. p: exact sign test, each by itself; of twenty such numbers one is below 0.05 by"
-        " chance."
+        f"{paired} more / less / equal: number of pairs. p: exact sign test{once}, each by itself; of twenty such numbers one is below 0.05"
+        " by chance."
     )
     table = ReportTable("", [("quantity", "text"), ("change", "text"), *columns], rows, caption)
     return Section("differences", "Differences of choices", lead, tables=[table] if rows else [])

@@ -27,20 +27,48 @@ def left(tracks: Trajectories) -> Figure:
     """Number of entities of each team over time, with a mark for each death and its cause."""
     figure = sheet(2.5)
     axes: Any = figure.subplots()
-    n_frames = len(tracks.frame_times)
-    team = np.repeat(tracks.team, np.diff(tracks.first))
     signs: list[Handle] = []
     causes: set[str] = set()
     for number, name in tracks.teams.items():
-        n = np.bincount(tracks.frame[team == number], minlength=n_frames)
-        axes.step(tracks.frame_times, n, where="post", **line_look(tracks, number))
+        t, n = _number_left(tracks, number)
+        axes.step(t, n, where="post", **line_look(tracks, number))
         signs.append((line_sign(**line_look(tracks, number)), f"{name}: {n[0]}, then {n[-1]}"))
-        causes |= _mark_deaths(axes, tracks, number, n)
+        causes |= _mark_deaths(axes, tracks, number, t, n)
     _whole_numbers(axes)
     axes.set_ylabel("entities")
     time_axis(axes, tracks.frame_times)
     add_head(figure, tracks, "Entities left", [*signs, *_cause_signs(tracks, causes)])
     return figure
+
+
+def _number_left(tracks: Trajectories, team: int) -> tuple[np.ndarray, np.ndarray]:
+    """Entities of a team over time: in each frame, and after each birth and death between frames that lie apart.
+
+    Returns:
+        Times [s], and how many there are from then on, (k,) each.
+    """
+    recording = tracks.recording
+    is_mine = np.repeat(tracks.team == team, np.diff(tracks.first))
+    n = np.bincount(tracks.frame[is_mine], minlength=len(tracks.frame_times))
+    steps = np.rint((tracks.frame_times - recording.start) / recording.dt).astype(np.int64)
+    mine = [h for h in tracks.events if tracks.team_of.get(h.id) == team and _is_chosen(tracks, h.id)]
+    born, died = (
+        np.rint((np.array([h.t for h in mine if h.kind == kind]) - recording.start) / recording.dt).astype(
+            np.int64
+        )
+        for kind in ("birth", "death")
+    )
+    born, gone = np.sort(born), np.sort(died + 1)  # who dies is there until the step ends
+    between = np.setdiff1d(np.append(born, gone), steps)
+    between = between[(between > steps[0]) & (between < steps[-1])]
+    frame = np.searchsorted(steps, between) - 1
+
+    def change(at: np.ndarray) -> np.ndarray:
+        return np.searchsorted(born, at, "right") - np.searchsorted(gone, at, "right")
+
+    t = np.append(tracks.frame_times, recording.start + between * recording.dt)
+    order = np.argsort(t, kind="stable")
+    return t[order], np.append(n, n[frame] + change(between) - change(steps[frame]))[order]
 
 
 def captures(tracks: Trajectories) -> Figure:
@@ -114,25 +142,26 @@ def _staircase(axes: Axes, tracks: Trajectories, times: list[float], **look: Any
     axes.step([first, *times, last], [*range(len(times) + 1), len(times)], where="post", **look)
 
 
-def _mark_deaths(axes: Axes, tracks: Trajectories, team: int, n: np.ndarray) -> set[str]:
+def _mark_deaths(axes: Axes, tracks: Trajectories, team: int, t: np.ndarray, n: np.ndarray) -> set[str]:
     """Mark deaths of a team on its curve.
 
     Args:
         axes: Where the curve is.
         tracks: What is plotted.
         team: The team.
-        n: How many of it are there in each frame, (T,).
+        t: Times [s], (k,).
+        n: How many of it are there from each on, (k,).
 
     Returns:
         Why they died.
     """
-    of_team = set(tracks.who[tracks.team == team].tolist())
-    deaths = [h for who, h in tracks.deaths.items() if who in of_team]
+    is_mine = {who: team == of for who, of in tracks.team_of.items() if _is_chosen(tracks, who)}
+    deaths = [h for h in tracks.events if h.kind == "death" and is_mine.get(h.id)]
     if len(deaths) > MAX_MARKS:
         return set()
     causes = _causes(tracks)
     for h in deaths:
-        at = int(np.searchsorted(tracks.frame_times, h.t + 1e-6 * tracks.recording.dt, side="right")) - 1
+        at = int(np.searchsorted(t, h.t + 1e-6 * tracks.recording.dt, side="right")) - 1
         axes.plot(
             h.t,
             n[at],

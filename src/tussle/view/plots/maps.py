@@ -312,7 +312,6 @@ def _edges(low: float, high: float, step: float) -> np.ndarray:
 
 
 def _durations(tracks: Trajectories) -> np.ndarray:
-    """Return the time from each frame of the span to the next [s], (T,); for the last frame, the usual time."""
+    """Return the time from each frame of the span to the next [s], (T,); nothing for the last one, unless there is no other."""
     lasts = np.diff(tracks.frame_times)
-    usual = float(np.median(lasts)) if len(lasts) else tracks.recording.dt
-    return np.append(lasts, usual)
+    return np.append(lasts, 0.0 if len(lasts) else tracks.recording.dt)

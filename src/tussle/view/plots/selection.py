@@ -132,11 +132,13 @@ class Trajectories:
 
     @cached_property
     def team_of(self) -> dict[int, int]:
-        """Team of each entity of the world, selected or not."""
-        is_mine = self._is_mine()
+        """Team of each entity of the world, selected or not, also of one that lived between two recorded states."""
+        is_mine, run = self._is_mine(), self.recording
         ids, first = np.unique(self._column("id")[is_mine], return_index=True)
         team = self._column("team")[is_mine][first]
-        return dict(zip(ids.tolist(), team.tolist(), strict=True))
+        by_block = dict(zip(run.blocks, run.block_teams, strict=True))
+        born = {h.id: by_block[h.text] for h in run.events if h.kind == "birth" and h.text in by_block}
+        return born | dict(zip(ids.tolist(), team.tolist(), strict=True))
 
     # -- reading the tables -----------------------------------------------------------------------------------------------------
 
@@ -178,6 +180,10 @@ class Trajectories:
                 t = self.recording.t[
                     np.isin(self.recording.steps, self._column("step")[self._is_mine("id", [who])])
                 ]
+                if not len(t):
+                    raise ParameterError(
+                        f"{where}: no state of entity {who} was recorded; it lived between two that were"
+                    )
                 raise ParameterError(
                     f"{where}: entity {who} does not exist {self._when()}; it does from {t[0]:g} s to {t[-1]:g} s"
                 )
