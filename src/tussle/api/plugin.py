@@ -104,6 +104,7 @@ class Plugin:
     columns: ClassVar[dict[str, Column]] = {}
     services: ClassVar[tuple[str, ...]] = ()
     row_laws: ClassVar[dict[str, RowLaw]] = {}
+    neighbor_laws: ClassVar[tuple[NeighborLaw, ...]] = ()
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
@@ -132,12 +133,9 @@ class Plugin:
         for name, law in vars(cls).items():
             if isinstance(law, (NeighborLaw, RowLaw)):
                 law.check(cls, name)
-        cls.row_laws = {
-            k: law
-            for base in reversed(cls.__mro__)
-            for k, law in vars(base).items()
-            if isinstance(law, RowLaw)
-        }
+        inherited = [(k, value) for base in reversed(cls.__mro__) for k, value in vars(base).items()]
+        cls.row_laws = {k: law for k, law in inherited if isinstance(law, RowLaw)}
+        cls.neighbor_laws = tuple(law for _, law in inherited if isinstance(law, NeighborLaw))
         params = [
             inspect.Parameter(k, inspect.Parameter.KEYWORD_ONLY, default=c.default)
             for k, c in cls.params().items()
@@ -388,6 +386,8 @@ class Plugin:
 
     def bound(self) -> Self:
         """Copy the plugin for a simulation, which sets the arrays; the original stays data."""
+        for law in self.neighbor_laws:
+            law.refresh()
         copy = object.__new__(type(self))
         copy.__dict__.update(self.__dict__, is_bound=True)
         return copy

@@ -24,7 +24,9 @@ HOOKS_NAMES = """
     awaits awaited with_files named_files named_teams stand_in only_calls_kernels
 """
 HOOKS = frozenset(HOOKS_NAMES.split())
-MACHINERY = frozenset({"columns", "services", "row_laws", "me_type", "world_types", "__signature__"})
+MACHINERY = frozenset(
+    {"columns", "services", "row_laws", "neighbor_laws", "me_type", "world_types", "__signature__"}
+)
 MUTABLE = (list, dict, set, bytearray, np.ndarray)
 MAGIC_NAMES = """
     __init__ __new__ __setattr__ __getattr__ __getattribute__ __delattr__ __eq__ __hash__ __reduce__
