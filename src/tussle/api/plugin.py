@@ -13,6 +13,7 @@ from typing import Any, ClassVar, Self, TypeVar
 import numpy as np
 
 from tussle.api.laws import NeighborLaw
+from tussle.api.overrides import check_names, check_overrides
 from tussle.api.row_laws import RowLaw
 from tussle.declare.columns import (
     Children,
@@ -32,7 +33,7 @@ C = TypeVar("C", bound=Column)
 GRADES = ("portable", "machine", "external")
 RATE = Param(1.0, unit="1/s", gt=0.0, lt=math.inf)
 RESERVED = ("name", "rate", "states")
-TAKEN = ("columns", "services", "wired", "values", "kind")
+TAKEN = ("columns", "services", "wired", "values", "kind", "instance_name", "is_bound", "active_in")
 """Attributes of every plugin, which no column can be."""
 
 
@@ -116,20 +117,8 @@ class Plugin:
         )
         if cls.grade not in GRADES:
             raise DeclarationError(f"{cls.__name__}.grade is {cls.grade!r}; allowed are {', '.join(GRADES)}")
-        for name, column in cls.columns.items():
-            if name in (*RESERVED, *TAKEN) or name.startswith("_"):
-                raise DeclarationError(
-                    f"{cls.__name__}.{name}: the name is reserved; choose another name for this {type(column).__name__}"
-                )
-            hidden = [
-                b.__name__
-                for b in cls.__mro__
-                if callable(vars(b).get(name)) and b.__module__.startswith("tussle.api.")
-            ]
-            if hidden:
-                raise DeclarationError(
-                    f"{cls.__name__}.{name}: {hidden[0]} has a method of this name; choose another name for this {type(column).__name__}"
-                )
+        check_names(cls, (*RESERVED, *TAKEN))
+        check_overrides(cls)
         for name, law in vars(cls).items():
             if isinstance(law, (NeighborLaw, RowLaw)):
                 law.check(cls, name)
