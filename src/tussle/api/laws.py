@@ -20,7 +20,7 @@ from tussle.numeric.neighbors.chain import Chain, TurnChain
 from tussle.numeric.neighbors.index import Blocks, Index
 from tussle.numeric.neighbors.law import OTHER, PAIR, Law
 from tussle.numeric.neighbors.walk import make_walk
-from tussle.numeric.rk4 import label
+from tussle.numeric.refusals import label
 
 COMPONENTS = {3: "xyz", 4: "wxyz", 2: "xy"}
 CODES = {"f": "F", "i": "I", "b": "B"}

@@ -9,7 +9,7 @@ from typing import Any
 
 from tussle.declare.columns import Column
 from tussle.errors import DeclarationError
-from tussle.numeric.rk4 import label
+from tussle.numeric.refusals import label
 
 OURS = "tussle.api."
 

@@ -14,7 +14,7 @@ from tussle.api.group import ROWS_PER_THREAD, GroupView
 from tussle.api.laws import BODY, components
 from tussle.declare.columns import Channel, Numbers, Output, Param, State
 from tussle.errors import DeclarationError, listed, nearest_name
-from tussle.numeric.rk4 import label
+from tussle.numeric.refusals import label
 from tussle.numeric.row_kernel import (
     BlockCall,
     Item,

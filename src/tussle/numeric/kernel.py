@@ -22,10 +22,12 @@ from weakref import WeakKeyDictionary, WeakSet
 
 import numpy as np
 
+from tussle.errors import DeclarationError
 from tussle.numeric import processor, store
 from tussle.numeric.device_compiler import device_compiler, set_environments, share_constants
 from tussle.numeric.fingerprint import Fingerprint, of_author, package
 from tussle.numeric.operator_types import type_numbers
+from tussle.numeric.refusals import compiler_errors, label, refusal
 from tussle.numeric.source import GENERATED
 
 Code = str | tuple[str, ...]
@@ -403,8 +405,13 @@ class Kernel(Device):
             if isinstance(holder, Device):
                 holder.refresh()
         type_numbers()
-        with compiling(), collecting_later():
-            main.compile(self.types)
+        try:
+            with compiling(), collecting_later():
+                main.compile(self.types)
+        except compiler_errors() as error:
+            if self.py_func.__code__.co_filename == GENERATED:  # who has generated it knows of whom
+                raise
+            raise DeclarationError(f"{label(self.py_func)} cannot be compiled: {refusal(error)}") from error
         stats.compiled += 1
         result = next(iter(main.overloads.values()))
         set_environments(result.library)

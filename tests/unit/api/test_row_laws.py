@@ -305,7 +305,7 @@ def test_names_that_mean_nothing_are_refused():
 def test_results_that_do_not_fit_are_refused_when_it_first_runs():
     with pytest.raises(PluginError, match=r"returns \(a number, a number\); its results are a number"):
         flown(game(declared(lambda yaw: (yaw, yaw), "turn_rate")(), DRIFTING), 1)
-    with pytest.raises(PluginError, match=r"<lambda>, .*: pitched cannot be compiled: "):
+    with pytest.raises(PluginError, match=r"<lambda> cannot be compiled: "):
         flown(game(declared(lambda yaw: sorted(str(yaw)), "turn_rate")(), DRIFTING), 1)
 
 

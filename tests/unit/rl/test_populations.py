@@ -246,16 +246,16 @@ def test_the_state_at_the_end_of_an_episode_is_kept():
 
 def test_blocks_have_policies():
     task = PredatorsAndPrey()
-    assert task.roles == {"prey": ["prey"], "hunters": ["hunters"], "switchers": ["switchers"]}
+    assert task.roles == {"prey": ["prey"], "keepers": ["keepers"], "switchers": ["switchers"]}
     assert {task.policy_of(name) for name in task.agent_names} == set(task.roles)
     assert task.policy_of("switchers_4") == "switchers"
-    shared = PredatorsAndPrey(policies={"hunters": "hunt", "switchers": "hunt"})
-    assert shared.roles == {"prey": ["prey"], "hunt": ["hunters", "switchers"]}
+    shared = PredatorsAndPrey(policies={"keepers": "hunt", "switchers": "hunt"})
+    assert shared.roles == {"prey": ["prey"], "hunt": ["keepers", "switchers"]}
     assert Flee().roles == {"": ["prey"]}
     with pytest.raises(
         ParameterError, match="the blocks prey keepers of 'all' observe or decide differently"
     ):
-        _ = PredatorsAndPrey(policies={"prey": "all", "hunters": "all"}).roles
+        _ = PredatorsAndPrey(policies={"prey": "all", "keepers": "all"}).roles
     with pytest.raises(ParameterError, match="no agent 'prey_100'"):
         task.policy_of("prey_100")
     assert evaluate(task.replace(time_limit=1.0), n_episodes=1).keys() == {"captures", "captured", "return"}
