@@ -466,6 +466,22 @@ class CountsCalls(SoundAutonomy):
         self.speed[:] = 1.0 / len(CALLS)
 
 
+class RemembersInADefault(SoundAutonomy):
+    """Remembers in a default of a method."""
+
+    def noted(self, number, notes=[]):  # noqa: B006 - what is tested
+        """The number of calls."""
+        notes.append(number)
+        return len(notes)
+
+
+class MisspellsAHook(SoundAutonomy):
+    """Has a method that is never called."""
+
+    def spwan(self, g, rows):
+        """Never called."""
+
+
 class RemembersById(SoundAutonomy):
     """Remembers outside of columns by entity, so that stacks do not show it, but a second game does."""
 
@@ -831,7 +847,16 @@ class DoesMore(SoundByKernels):
 
 BROKEN = {
     "only_calls_kernels": [DoesMore],
-    "declarations": [NoDoc, ListOnClass, NotAHook, OwnInit, NothingToDo, DeclaresPos],
+    "declarations": [
+        RemembersInADefault,
+        MisspellsAHook,
+        NoDoc,
+        ListOnClass,
+        NotAHook,
+        OwnInit,
+        NothingToDo,
+        DeclaresPos,
+    ],
     "stack invariance": [
         CountsRows,
         KnowsItsRow,

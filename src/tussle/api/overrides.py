@@ -51,7 +51,11 @@ def check_overrides(cls: Any) -> None:
         DeclarationError: One does not.
     """
     for function, called in _overrides(cls):
-        given = inspect.signature(called).parameters
+        given = [
+            name
+            for name, each in inspect.signature(called).parameters.items()
+            if each.kind is each.POSITIONAL_OR_KEYWORD
+        ]
         try:
             inspect.signature(function).bind(*given)
         except TypeError:

@@ -242,7 +242,7 @@ class WorldView(GroupView):
 
     def inbox(self, type_: type[Message]) -> Messages:
         """All messages of a type published so far in this step, on any topic, ordered by (world, sender)."""
-        if not (isinstance(type_, type) and issubclass(type_, Message)):
+        if not issubclass(type_, Message):
             raise ParameterError(
                 f"w.inbox: {type_!r} is not allowed; it takes a message type, such as EntityCaptured"
             )

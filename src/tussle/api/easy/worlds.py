@@ -12,14 +12,23 @@ from tussle.api.easy.entities import (
     Entity,
     Observer,
     Other,
-    check_id,
     public_names,
     squared_distance,
     whole_id,
 )
 from tussle.api.easy.search import Search
 from tussle.api.easy.shared import RandomNumbers, WorldDraw
-from tussle.api.easy.values import BODY, VECTORS, Cells, Columns, ReceivedMessage, Write, make_type, with_ids
+from tussle.api.easy.values import (
+    BODY,
+    VECTORS,
+    Cells,
+    Columns,
+    ReceivedMessage,
+    Write,
+    check_id,
+    make_type,
+    with_ids,
+)
 from tussle.api.world import WorldView
 from tussle.arguments import explained
 from tussle.declare.columns import Column, State

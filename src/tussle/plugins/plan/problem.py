@@ -167,7 +167,7 @@ class Problem:
         """Values of the inputs, (k,), where no command sets them."""
         optional = [column for column in type(self.motion).inputs().values() if column.optional]
         rest = {name: column.default for column in optional for name in column.channels}
-        return np.array([float((rest | self.held).get(name, 0.0)) for name in self.inputs])
+        return np.array([float({**rest, **self.held}.get(name, 0.0)) for name in self.inputs])
 
     @cached_property
     def first(self) -> np.ndarray:
