@@ -418,13 +418,6 @@ class NoStep(Autonomy):
     speed = Output(unit="m/s")
 
 
-class WrongStep(SoundAutonomy):
-    """Wants more arguments than it is given."""
-
-    def step(self, g, dt):
-        pass
-
-
 class HalfBelief(SoundSensor):
     """Believes in a place on the map only."""
 
@@ -870,7 +863,6 @@ BROKEN = {
     "reset": [ForgetsToReset],
     "runs": [
         NoStep,
-        WrongStep,
         HalfBelief,
         SetsAttribute,
         WritesView,
