@@ -418,13 +418,6 @@ class NoStep(Autonomy):
     speed = Output(unit="m/s")
 
 
-class WrongStep(SoundAutonomy):
-    """Wants more arguments than it is given."""
-
-    def step(self, g, dt):
-        pass
-
-
 class HalfBelief(SoundSensor):
     """Believes in a place on the map only."""
 
@@ -464,6 +457,22 @@ class CountsCalls(SoundAutonomy):
     def step(self, g: GroupView) -> None:
         CALLS.append(1)
         self.speed[:] = 1.0 / len(CALLS)
+
+
+class RemembersInADefault(SoundAutonomy):
+    """Remembers in a default of a method."""
+
+    def noted(self, number, notes=[]):  # noqa: B006 - what is tested
+        """The number of calls."""
+        notes.append(number)
+        return len(notes)
+
+
+class MisspellsAHook(SoundAutonomy):
+    """Has a method that is never called."""
+
+    def spwan(self, g, rows):
+        """Never called."""
 
 
 class RemembersById(SoundAutonomy):
@@ -831,7 +840,16 @@ class DoesMore(SoundByKernels):
 
 BROKEN = {
     "only_calls_kernels": [DoesMore],
-    "declarations": [NoDoc, ListOnClass, NotAHook, OwnInit, NothingToDo, DeclaresPos],
+    "declarations": [
+        RemembersInADefault,
+        MisspellsAHook,
+        NoDoc,
+        ListOnClass,
+        NotAHook,
+        OwnInit,
+        NothingToDo,
+        DeclaresPos,
+    ],
     "stack invariance": [
         CountsRows,
         KnowsItsRow,
@@ -845,7 +863,6 @@ BROKEN = {
     "reset": [ForgetsToReset],
     "runs": [
         NoStep,
-        WrongStep,
         HalfBelief,
         SetsAttribute,
         WritesView,

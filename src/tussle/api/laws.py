@@ -14,12 +14,13 @@ from tussle.api.bodies import DERIVED, FLOATS, IN_PLACE, INTS, Bodies, CachedArr
 from tussle.api.group import GroupView
 from tussle.declare.columns import Channel, Numbers, Param
 from tussle.errors import DeclarationError, listed, nearest_name
+from tussle.numeric.fingerprint import of_author, package
 from tussle.numeric.kernel import Kernel, is_interpreted
 from tussle.numeric.neighbors.chain import Chain, TurnChain
 from tussle.numeric.neighbors.index import Blocks, Index
 from tussle.numeric.neighbors.law import OTHER, PAIR, Law
 from tussle.numeric.neighbors.walk import make_walk
-from tussle.numeric.rk4 import label
+from tussle.numeric.refusals import label
 
 COMPONENTS = {3: "xyz", 4: "wxyz", 2: "xy"}
 CODES = {"f": "F", "i": "I", "b": "B"}
@@ -119,6 +120,7 @@ class NeighborLaw:
         self.laws, self.where, self.names = laws, where, names
         self.__doc__ = laws[0].function.__doc__
         self._plans: dict[type, WalkPlan] = {}
+        self._digests: tuple[str, ...] = ()
 
     def __get__(self, plugin: Any, owner: type) -> Any:
         if plugin is None:
@@ -129,7 +131,19 @@ class NeighborLaw:
     def first_walk(self, plugin: Any, g: GroupView) -> Contributions:
         """Make the plan for the plugin's class, and evaluate the laws."""
         plan = self._plans[type(plugin)] = make_plan(g, plugin, self)
+        self._digests = self._digests or self.digests()
         return plan.walk(plugin, g)
+
+    def digests(self) -> tuple[str, ...]:
+        """Hashes of the functions, with all that they reach; none for those of tussle."""
+        functions = [law.function for law in (*self.laws, *([self.where] if self.where else []))]
+        return tuple(of_author(each) for each in functions if package(each) != "tussle")
+
+    def refresh(self) -> None:
+        """Forget the plans if what the functions reach has changed, e.g. a global redefined in an interactive shell."""
+        if self._plans and self._digests != self.digests():
+            self._plans.clear()
+            self._digests = ()
 
     def check(self, cls: type, name: str) -> None:
         """Check that all arguments and radii of the laws exist in a plugin class.

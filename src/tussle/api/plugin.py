@@ -13,6 +13,7 @@ from typing import Any, ClassVar, Self, TypeVar
 import numpy as np
 
 from tussle.api.laws import NeighborLaw
+from tussle.api.overrides import check_names, check_overrides
 from tussle.api.row_laws import RowLaw
 from tussle.declare.columns import (
     Children,
@@ -32,7 +33,7 @@ C = TypeVar("C", bound=Column)
 GRADES = ("portable", "machine", "external")
 RATE = Param(1.0, unit="1/s", gt=0.0, lt=math.inf)
 RESERVED = ("name", "rate", "states")
-TAKEN = ("columns", "services", "wired", "values", "kind")
+TAKEN = ("columns", "services", "wired", "values", "kind", "instance_name", "is_bound", "active_in")
 """Attributes of every plugin, which no column can be."""
 
 
@@ -104,6 +105,7 @@ class Plugin:
     columns: ClassVar[dict[str, Column]] = {}
     services: ClassVar[tuple[str, ...]] = ()
     row_laws: ClassVar[dict[str, RowLaw]] = {}
+    neighbor_laws: ClassVar[tuple[NeighborLaw, ...]] = ()
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
@@ -115,29 +117,14 @@ class Plugin:
         )
         if cls.grade not in GRADES:
             raise DeclarationError(f"{cls.__name__}.grade is {cls.grade!r}; allowed are {', '.join(GRADES)}")
-        for name, column in cls.columns.items():
-            if name in (*RESERVED, *TAKEN) or name.startswith("_"):
-                raise DeclarationError(
-                    f"{cls.__name__}.{name}: the name is reserved; choose another name for this {type(column).__name__}"
-                )
-            hidden = [
-                b.__name__
-                for b in cls.__mro__
-                if callable(vars(b).get(name)) and b.__module__.startswith("tussle.api.")
-            ]
-            if hidden:
-                raise DeclarationError(
-                    f"{cls.__name__}.{name}: {hidden[0]} has a method of this name; choose another name for this {type(column).__name__}"
-                )
+        check_names(cls, (*RESERVED, *TAKEN))
+        check_overrides(cls)
         for name, law in vars(cls).items():
             if isinstance(law, (NeighborLaw, RowLaw)):
                 law.check(cls, name)
-        cls.row_laws = {
-            k: law
-            for base in reversed(cls.__mro__)
-            for k, law in vars(base).items()
-            if isinstance(law, RowLaw)
-        }
+        inherited = [(k, value) for base in reversed(cls.__mro__) for k, value in vars(base).items()]
+        cls.row_laws = {k: law for k, law in inherited if isinstance(law, RowLaw)}
+        cls.neighbor_laws = tuple(law for _, law in inherited if isinstance(law, NeighborLaw))
         params = [
             inspect.Parameter(k, inspect.Parameter.KEYWORD_ONLY, default=c.default)
             for k, c in cls.params().items()
@@ -388,6 +375,8 @@ class Plugin:
 
     def bound(self) -> Self:
         """Copy the plugin for a simulation, which sets the arrays; the original stays data."""
+        for law in self.neighbor_laws:
+            law.refresh()
         copy = object.__new__(type(self))
         copy.__dict__.update(self.__dict__, is_bound=True)
         return copy

@@ -14,7 +14,7 @@ from tussle.api.group import ROWS_PER_THREAD, GroupView
 from tussle.api.laws import BODY, components
 from tussle.declare.columns import Channel, Numbers, Output, Param, State
 from tussle.errors import DeclarationError, listed, nearest_name
-from tussle.numeric.rk4 import label
+from tussle.numeric.refusals import label
 from tussle.numeric.row_kernel import (
     BlockCall,
     Item,
@@ -85,8 +85,9 @@ class RowLaw:
             for each in names:
                 if each not in allowed:
                     own = [k for k in allowed if k not in BODY_NUMBERS]
+                    place, where = label(self.function), f"{cls.__name__}.{name}"
                     raise DeclarationError(
-                        f"{label(self.function)}: {cls.__name__}.{name}: {each!r} is no {kind} of a row law"
+                        f"{place if place.endswith(where) else f'{place}: {where}'}: {each!r} is no {kind} of a row law{_form(cls, each)}"
                         f"{nearest_name(each, allowed)}; {listed(own)}; and body columns"
                     )
 
@@ -96,6 +97,21 @@ class RowLaw:
         takes, gives = arguments_of(cls), results_of(cls)
         arguments = [takes[name] or Text(repr(plugin.values[name])) for name in self.arguments]
         return RowCall(self.function, tuple(arguments), tuple(gives[name] for name in self.results))
+
+
+def _form(cls: Any, name: str) -> str:
+    """What a column is that cannot be what it is in a law, for messages."""
+    column = cls.columns.get(name)
+    if column is None:
+        return ""
+    of = (
+        ""
+        if not isinstance(column, Numbers)
+        else " of lists"
+        if column.ragged
+        else f" of {column.dtype.__name__}"
+    )
+    return f", as a {type(column).__name__}{of}"
 
 
 def own_numbers(cls: Any) -> dict[str, tuple[Number, ...]]:

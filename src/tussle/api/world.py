@@ -16,7 +16,7 @@ from tussle.declare.comms import TopicBuffer
 from tussle.declare.messages import Message, Messages
 from tussle.errors import MissionError, ParameterError, PluginError, listed, nearest_name
 from tussle.numeric import rng
-from tussle.numeric.arrays import numbers_below
+from tussle.numeric.arrays import numbers_below, numbers_of
 
 
 class WorldBodies(BodyView):
@@ -150,9 +150,9 @@ class WorldView(GroupView):
             return
         for name, given, k in (("pos", pos, 3), ("vel", vel, 3), ("quat", quat, 4), ("omega", omega, 3)):
             if given is not None:
-                value = np.asarray(given, float)
+                value = numbers_of(given, f"w.move: {name}")
                 value = value[:, None] if value.ndim == 1 else value
-                if value.shape[0] != k or value.shape[1] not in (1, len(rows)):
+                if value.ndim != 2 or value.shape[0] != k or value.shape[1] not in (1, len(rows)):
                     raise ParameterError(
                         f"w.move: {name} has shape {value.shape}; it takes ({k}, {len(rows)})"
                     )
@@ -242,6 +242,10 @@ class WorldView(GroupView):
 
     def inbox(self, type_: type[Message]) -> Messages:
         """All messages of a type published so far in this step, on any topic, ordered by (world, sender)."""
+        if not issubclass(type_, Message):
+            raise ParameterError(
+                f"w.inbox: {type_!r} is not allowed; it takes a message type, such as EntityCaptured"
+            )
         topics = [t for t in self.by_type.get(type_, ()) if t.sent]
         if not topics:
             return Messages.empty(type_)
@@ -299,6 +303,10 @@ class WorldView(GroupView):
         second: np.ndarray,
         k: int,
     ) -> np.ndarray:
+        world, first, second = (
+            np.atleast_1d(numbers_of(each, f"numbers of the draw {label!r}", "iu"))
+            for each in (world, first, second)
+        )
         draw, keys = self._draw(label), self.context.keys[world]
         if self.context.redraws:
             keys = self._redrawn_by(keys, draw, world, first)

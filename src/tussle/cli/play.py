@@ -341,6 +341,11 @@ def planned_by(options: RunOptions | ViewOptions) -> PlannedRun:
                 allow_large=options.allow_large,
                 search=options.data_path,
             )
+        if run and documents.is_count(world) and (Path(run) / RUN_FILE).exists():
+            raise ParameterError(
+                f"--from {run!r}: the run has no {MISSION_FILE}: its mission was made in Python, where Simulation(mission, seed) plays it "
+                "again, with play_inputs(load_inputs(directory)) for what came from outside"
+            )
     if not colon or not documents.is_count(number):
         raise ParameterError(
             f"--from {options.from_batch!r} is not allowed; it takes a batch directory and the number of a run, "

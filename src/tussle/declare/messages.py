@@ -58,8 +58,12 @@ class Message:
                 raise DeclarationError(
                     f"{cls.__name__}.{name}: a message field is a Field, EntityRef or Handle, not {type(column).__name__}"
                 )
-            if name in ("world", "sender", "n"):
-                raise DeclarationError(f"{cls.__name__}.{name}: the name is reserved in messages")
+            if name in (
+                taken := ("world", "sender", "type", "data", *(k for k in vars(Messages) if k[0] != "_"))
+            ):
+                raise DeclarationError(
+                    f"{cls.__name__}.{name}: the name is reserved in messages, as are {', '.join(taken)}; choose another one"
+                )
         if sum(isinstance(c, Field) and c.ragged for c in cls.fields.values()) > 1:
             raise DeclarationError(
                 f"{cls.__name__} has more than one ragged field; split it into two message types"

@@ -16,6 +16,7 @@ from tussle.engine.manual import request_control
 from tussle.engine.state import SimulationState
 from tussle.engine.world_bindings import WorldBinding
 from tussle.errors import ParameterError, WiringError, clipped, listed, nearest_name
+from tussle.numeric.arrays import numbers_below
 
 
 def deliver(state: SimulationState) -> None:
@@ -111,8 +112,7 @@ def _post(state: SimulationState, network: WorldBinding, topic: TopicBuffer, to:
     """Queue the messages of a topic for receivers as `Network.route` returns them."""
     clock, batch = state.context.clock, topic.outbox()
     if isinstance(to, tuple) and len(to) == 2:
-        number, rows = to
-        to = (np.asarray(number, np.int64), state.population.bodies.id[np.asarray(rows, np.int64)])
+        to = _receivers(state, topic, batch.world, *to)
     elif to not in (EVERYONE, SAME_ENTITY):
         raise WiringError(
             f"{topic.network}.route returned {to!r}; it must return EVERYONE, SAME_ENTITY or (message numbers, rows)"
@@ -120,6 +120,32 @@ def _post(state: SimulationState, network: WorldBinding, topic: TopicBuffer, to:
     if topic.inboxes:
         steps = _steps(network.plugin.comm_delay, clock.dt)[batch.world]
         topic.post(batch, to, clock.step[batch.world] + steps)
+
+
+def _receivers(
+    state: SimulationState, topic: TopicBuffer, world: np.ndarray, number: Any, rows: Any
+) -> tuple[np.ndarray, np.ndarray]:
+    """Numbers of messages, whose worlds are `world`, and ids of their receivers, from what `Network.route` returns.
+
+    Raises:
+        ParameterError: There is no such message or row, or not one row for each message.
+        WiringError: A row is in another world than its message.
+    """
+    where, bodies = f"{topic.network}.route:", state.population.bodies
+    number = numbers_below(len(world), number, f"{where} message numbers")
+    rows = numbers_below(len(bodies.id), rows, f"{where} rows", ", as of a removed entity,")
+    if len(number) != len(rows):
+        raise WiringError(
+            f"{where} {len(number)} message numbers and {len(rows)} rows; it returns one row per message number"
+        )
+    strays = np.flatnonzero(world[number] != bodies.world[rows])
+    if len(strays):
+        k = strays[0]
+        raise WiringError(
+            f"{where} message {number[k]}, of world {world[number[k]]}, goes to row {rows[k]}, of world {bodies.world[rows[k]]}; messages "
+            "stay in their world"
+        )
+    return number, bodies.id[rows]
 
 
 def _check_links(links: Links, losses: tuple[str, ...]) -> None:

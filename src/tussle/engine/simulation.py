@@ -38,6 +38,7 @@ from tussle.mission import GivenMission, Mission, mission_of
 from tussle.mission.rekeys import Rekeys
 from tussle.mission.spec import SHUFFLED
 from tussle.notebook_bar import notebook_bar
+from tussle.numeric.kernel import refresh_kernels
 from tussle.record.inputs import COLUMN, GIVER, ExternalInput, fields_of, given_by, of_message
 
 if TYPE_CHECKING:
@@ -90,6 +91,7 @@ class Simulation:
         numbers = list(seeds) if isinstance(seeds, Iterable) else [seeds]
         check_argument("threads", threads, Whole(1))
         self._check(mission, numbers, on_error)
+        refresh_kernels()
         self.mission, self.n_worlds = mission, len(numbers)
         self.observers: list[Callable[[Simulation], None]] = []
         self._inputs: dict[int, dict[int, list[ExternalInput]]] = {}

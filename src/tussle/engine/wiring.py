@@ -11,6 +11,12 @@ from tussle.declare.columns import Channel, Output
 from tussle.engine.table import ColumnPlace, Table
 from tussle.errors import WiringError, listed, nearest_name
 
+FEEDS = {
+    "autonomy": "autonomies read those of sensors",
+    "controller": "a controller reads those of sensors, and of what stands before it",
+    "motion": "the motion model reads those of sensors, and of the last controller if there is one",
+}
+"""What feeds a kind of plugin, for messages."""
 BELIEF = {"belief_pos": ("pos", 3, "m"), "belief_vel": ("vel", 3, "m/s"), "belief_quat": ("quat", 4, "")}
 
 
@@ -74,6 +80,7 @@ class Wiring:
         self.wired: dict[int, set[str]] = {}
         self.writers: list[tuple[str, str, list[str]]] = []
         self.sensed: list[str] = []
+        self._all: tuple[Any, ...] = ()
 
     def connect(
         self, sensors: Sequence[Any], autonomies: Sequence[Any], controllers: Sequence[Any], motion: Any
@@ -83,6 +90,7 @@ class Wiring:
         Raises:
             WiringError: No plugin writes an input's channel, or its writer has another unit or other fields.
         """
+        self._all = (*sensors, *autonomies, *controllers)
         working = [c for c in controllers if not c.passthrough]
         autonomies = [plugin for autonomy in autonomies for plugin in sharing(autonomy)]
         self._check_passthrough(controllers, [*working, motion])
@@ -243,6 +251,9 @@ class Wiring:
         fitting = self.advise(offered, [c for _, column in read_channels(reader) for c in column.channels])
         advice = f"; controllers that connect them: {', '.join(fitting)}" if fitting else ""
         by = f" through {through}" if through else ""
+        others = [p for p in self._all if any(channel in c.channels for c in written_channels(p).values())]
+        if others and reader.kind in FEEDS:
+            advice += f"; {others[0].instance_name} writes it, but {FEEDS[reader.kind]}"
         return WiringError(
             f"{self.where}: no plugin writes channel {channel!r} for {reader.instance_name}{by}{nearest_name(channel, offered)}; "
             f"written channels: {', '.join(offered) or 'none'}{advice}"

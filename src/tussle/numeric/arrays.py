@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -53,6 +55,23 @@ def matmul(w: ArrayLike, x: ArrayLike) -> Floats:
     out = np.empty((left.shape[0], right.shape[1]))
     matmul_columns(left, right, out)
     return out
+
+
+def numbers_of(given: ArrayLike, where: str, kinds: str = "biuf") -> NDArray[Any]:
+    """Return numbers as an array, real ones (kinds "biuf") as floats.
+
+    Raises:
+        ParameterError: They are something else; `where` begins the message.
+    """
+    try:
+        array = np.asarray(given)
+    except ValueError:  # lists of different lengths
+        array = np.empty(1, object)
+    if array.size and array.dtype.kind not in kinds:
+        raise ParameterError(
+            f"{where} = {given!r:.60} is not allowed; it takes {'numbers' if 'f' in kinds else 'whole numbers'}"
+        )
+    return array.astype(float, copy=False) if "f" in kinds else array
 
 
 def numbers_below(n: int, given: ArrayLike, where: str, hint: str = "") -> NDArray[np.int64]:

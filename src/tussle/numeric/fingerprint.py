@@ -8,6 +8,7 @@ objects that its names refer to, through plain functions, jitted functions, clos
 from __future__ import annotations
 
 import builtins
+import dis
 import hashlib
 import os
 import sys
@@ -32,9 +33,14 @@ class Fingerprint:
         digest: The hash, as hexadecimal digits.
         holders: Reached objects with a `py_func` (devices, kernels, Numba's dispatchers).
         opaque: Descriptions of reached objects that cannot be hashed. Code that depends on them must not be cached.
+
+    Args:
+        function: The function.
+        passes_tussle: Whether functions of tussle, which do not change while a process runs, are hashed with what they reach.
     """
 
-    def __init__(self, function: Callable[..., Any]) -> None:
+    def __init__(self, function: Callable[..., Any], passes_tussle: bool = True) -> None:
+        self._passes_tussle = passes_tussle
         self.holders: list[Any] = []
         self.opaque: list[str] = []
         self._hash = hashlib.blake2b(digest_size=16)
@@ -80,11 +86,13 @@ class Fingerprint:
             self._visit_other(value)
 
     def _visit_function(self, function: types.FunctionType) -> None:
-        if is_fixed(function):
+        if is_fixed(function) or not (self._passes_tussle or package(function) != "tussle"):
             self._write("fixed", f"{function.__module__}.{function.__qualname__}")
             return
         code = function.__code__
         self._write("function", code_text(code, function.__doc__))
+        if lines := lines_of_errors(code, package(function)):
+            self._write("lines", lines)
         self._visit(function.__defaults__, frozenset())
         self._write(repr(sorted(function.__kwdefaults__ or ())))
         self._visit(tuple((function.__kwdefaults__ or {}).values()), frozenset())
@@ -129,6 +137,11 @@ class Fingerprint:
         else:
             self._write("opaque", name)
             self.opaque.append(f"{type(value).__qualname__} {name.strip('.')}".strip())
+
+
+def of_author(function: Callable[..., Any]) -> str:
+    """Hash of what a function outside tussle reaches and can change in this process."""
+    return Fingerprint(function, passes_tussle=False).digest
 
 
 def constant(value: Any) -> str | None:
@@ -182,6 +195,15 @@ def code_text(code: types.CodeType, doc: str | None) -> str:
             code_text(value, None) if isinstance(value, types.CodeType) else constant(value) or repr(value)
         )
     return repr(parts)
+
+
+@cache
+def lines_of_errors(code: types.CodeType, owner: str) -> str:
+    """Text of the file and lines that errors of an author's function name, which its machine code holds; "" if it raises none."""
+    raises = any(dis.opmap["RAISE_VARARGS"] in each.co_code[::2] for each in codes_of(code))
+    if owner == "tussle" or not raises:
+        return ""
+    return f"{code.co_filename} {code.co_firstlineno} {code.co_linetable.hex()}"
 
 
 def is_fixed(function: types.FunctionType) -> bool:

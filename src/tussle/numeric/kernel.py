@@ -18,14 +18,17 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache, cached_property, update_wrapper
 from typing import Any, ClassVar, Self
-from weakref import WeakSet
+from weakref import WeakKeyDictionary, WeakSet
 
 import numpy as np
 
+from tussle.errors import DeclarationError
 from tussle.numeric import processor, store
 from tussle.numeric.device_compiler import device_compiler, set_environments, share_constants
-from tussle.numeric.fingerprint import Fingerprint, package
+from tussle.numeric.fingerprint import Fingerprint, of_author, package
 from tussle.numeric.operator_types import type_numbers
+from tussle.numeric.refusals import compiler_errors, label, refusal
+from tussle.numeric.source import GENERATED
 
 Code = str | tuple[str, ...]
 FORMAT = 4  # version of the file format, part of every key
@@ -61,6 +64,8 @@ WORD = re.compile(r"[^\s()]+")
 stats = Stats()
 ready: WeakSet[Kernel] = WeakSet()
 """Kernels whose machine code exists."""
+_of_authors: WeakKeyDictionary[Device, str] = WeakKeyDictionary()
+"""Kernels outside tussle, and devices, whose machine code Python calls -> what it depends on."""
 _lock = threading.RLock()
 
 
@@ -192,6 +197,15 @@ class Device:
         if self._dispatcher is not None and Fingerprint(self.py_func).digest != self._digest:
             self._dispatcher = self._for_python = None
 
+    def _note(self) -> None:
+        """Note what the code of an author depends on, for `refresh_kernels`."""
+        if package(self.py_func) != "tussle" and self.py_func.__code__.co_filename != GENERATED:
+            _of_authors[self] = of_author(self.py_func)
+
+    def discard(self) -> None:
+        """Forget the machine code."""
+        self._dispatcher = self._for_python = None
+
     @property
     def dispatcher(self) -> Any:
         """Numba's dispatcher for kernels that call the function, created on first access. Python cannot call it."""
@@ -218,6 +232,7 @@ class Device:
             return self.py_func(*args, **named)
         if self._for_python is None:
             self._for_python = jitted(renamed(self.py_func, Fingerprint(self.py_func).digest), **self.options)
+            self._note()
         with compiling():  # argument types may be new
             return self._for_python(*args, **named)
 
@@ -342,9 +357,19 @@ class Kernel(Device):
                 built()[self.name, key] = main, result
             self._main = main
             self._compiled = result
+            self._note()
             self.call_by(main)
             ready.add(self)
             stats.ready += 1
+
+    def discard(self) -> None:
+        """Forget the machine code: the next call makes it anew."""
+        with _lock:
+            super().discard()
+            self._compiled = self._main = None
+            self.__dict__.pop("address", None)
+            del type(self).__call__
+            ready.discard(self)
 
     @property
     def machine_code(self) -> Callable[..., Any]:
@@ -380,8 +405,13 @@ class Kernel(Device):
             if isinstance(holder, Device):
                 holder.refresh()
         type_numbers()
-        with compiling(), collecting_later():
-            main.compile(self.types)
+        try:
+            with compiling(), collecting_later():
+                main.compile(self.types)
+        except compiler_errors() as error:
+            if self.py_func.__code__.co_filename == GENERATED:  # who has generated it knows of whom
+                raise
+            raise DeclarationError(f"{label(self.py_func)} cannot be compiled: {refusal(error)}") from error
         stats.compiled += 1
         result = next(iter(main.overloads.values()))
         set_environments(result.library)
@@ -417,6 +447,14 @@ def grouped(arguments: str) -> tuple[Code, ...]:
     return tuple(
         code or tuple(group.split()) for group, code in re.findall(r"\(([^()]*)\)|([^\s()]+)", arguments)
     )
+
+
+def refresh_kernels() -> None:
+    """Discard machine code of functions outside tussle if what they reach has changed, e.g. a global redefined in an interactive shell."""
+    for each, known in list(_of_authors.items()):
+        if of_author(each.py_func) != known:
+            del _of_authors[each]
+            each.discard()
 
 
 def kernel(signature: str) -> Callable[[Callable[..., Any]], Kernel]:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from tussle.errors import DeclarationError, listed, nearest_name
 from tussle.numeric.address import caller
 from tussle.numeric.kernel import Device, Kernel, device, is_interpreted, kernel
+from tussle.numeric.refusals import compiler_errors, label, refusal
 from tussle.numeric.source import define
 
 Floats = NDArray[np.float64]
@@ -73,13 +74,6 @@ def compile_derivative(
     wrapper = define(lines, scope, function.__module__, f"{function.__qualname__}.wrapper")
     wrapper.states = tuple(x_names)  # type: ignore[attr-defined]
     return kernel(DERIVATIVE)(wrapper)
-
-
-def label(function: Callable[..., Any]) -> str:
-    """File, line and name of a function, for messages."""
-    plain = getattr(function, "py_func", function)
-    code = plain.__code__
-    return f"{code.co_filename}:{code.co_firstlineno}: {plain.__qualname__}"
 
 
 @cache
@@ -163,11 +157,9 @@ def address_of(derivative: Kernel) -> int:
     Raises:
         DeclarationError: The derivative cannot be compiled.
     """
-    from numba.core.errors import NumbaError
-
     try:
         return derivative.address
-    except NumbaError as error:
+    except compiler_errors() as error:
         wrapper = derivative.py_func
         function, states = wrapper.__globals__["function"].py_func, wrapper.states  # type: ignore[attr-defined]
         try:
@@ -179,5 +171,5 @@ def address_of(derivative: Kernel) -> int:
                 f"returns {len(found)} derivatives, but there are {len(states)} states: {', '.join(states)}"
             )
         else:
-            text = f"cannot be compiled: {error}"
+            text = f"cannot be compiled: {refusal(error)}"
         raise DeclarationError(f"{label(function)} {text}") from error

@@ -12,7 +12,7 @@ from tussle.errors import DeclarationError
 from tussle.numeric.address import caller
 from tussle.numeric.fingerprint import package
 from tussle.numeric.kernel import Device, device, kernel
-from tussle.numeric.rk4 import label
+from tussle.numeric.refusals import compiler_errors, label, refusal
 from tussle.numeric.source import define, indented
 
 BLOCK = 128
@@ -189,8 +189,6 @@ class RowKernel:
             raise
 
     def _explain(self, error: Exception) -> None:
-        from numba.core.errors import NumbaError
-
         for call in self._functions():
             function = getattr(call.function, "py_func", call.function)
             ones = [(1.0,) * len(each) if isinstance(each, tuple) else 1.0 for each in call.arguments]
@@ -203,9 +201,10 @@ class RowKernel:
                 raise DeclarationError(
                     f"{label(function)} returns {found}; its results are {wanted}"
                 ) from error
-        if isinstance(error, NumbaError):
-            names = ", ".join(label(call.function) for call in self._functions())
-            raise DeclarationError(f"{names} cannot be compiled: {error}") from error
+        if isinstance(error, compiler_errors()):
+            of_author = [each for each in self._functions() if package(each.function) != "tussle"]
+            names = ", ".join(label(call.function) for call in of_author or self._functions())
+            raise DeclarationError(f"{names} cannot be compiled: {refusal(error)}") from error
 
 
 def shape_of(value: Any) -> str:

@@ -10,6 +10,8 @@ from types import FunctionType
 from typing import Any
 
 INDENT = "    "
+GENERATED = "<generated>"
+"""File of generated functions in tracebacks."""
 
 
 def indented(depth: int, lines: Iterable[str]) -> Iterator[str]:
@@ -18,7 +20,7 @@ def indented(depth: int, lines: Iterable[str]) -> Iterator[str]:
 
 
 def define(
-    lines: Iterable[str], scope: Mapping[str, Any], module: str, qualname: str, file: str = "<generated>"
+    lines: Iterable[str], scope: Mapping[str, Any], module: str, qualname: str, file: str = GENERATED
 ) -> FunctionType:
     """Return the function that the lines define; the first is its `def`.
 

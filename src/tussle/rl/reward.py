@@ -44,6 +44,13 @@ class FoundOthers:
     relative_vel: np.ndarray
 
 
+def read_only(array: np.ndarray) -> np.ndarray:
+    """A view that cannot be written, of an array that all terms of a reward share."""
+    view = array.view()
+    view.flags.writeable = False
+    return view
+
+
 @explained
 class Situation:
     """The agents of all worlds after a decision, for rewards and ends; W worlds, A agents in each. Arrays are valid until the next step.
@@ -92,7 +99,7 @@ class Situation:
             table = np.atleast_2d(source)
             out = np.zeros((self.alive.size, len(table)))
             kernels.take(np.ascontiguousarray(table, float), self.rows, self.agents, out)
-            self._columns[name] = out.reshape(*self.alive.shape, *source.shape[:-1])
+            self._columns[name] = read_only(out.reshape(*self.alive.shape, *source.shape[:-1]))
         return self._columns[name]  # type: ignore[no-any-return]
 
     def nearest(
@@ -116,7 +123,8 @@ class Situation:
             values = seen.reshape(*self.alive.shape, *([] if k is None else [k]), 8)
             found = values[..., 7] > 0.0
             distance = np.where(found, values[..., 6], np.inf)
-            self._columns[key] = FoundOthers(found, distance, values[..., :3], values[..., 3:6])
+            parts = found, distance, values[..., :3], values[..., 3:6]
+            self._columns[key] = FoundOthers(*map(read_only, parts))
         return self._columns[key]  # type: ignore[no-any-return]
 
     def n_within(self, radius: float, of: str | int | None = None) -> np.ndarray:
@@ -127,7 +135,8 @@ class Situation:
         """
         key = "within", of, radius
         if key not in self._columns:
-            self._columns[key] = self._observed(key, lambda: Means(radius, "", of)).reshape(self.alive.shape)
+            seen = self._observed(key, lambda: Means(radius, "", of))
+            self._columns[key] = read_only(seen.reshape(self.alive.shape))
         return self._columns[key]  # type: ignore[no-any-return]
 
     def n_living(self, of: str | int) -> np.ndarray:

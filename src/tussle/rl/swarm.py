@@ -334,13 +334,14 @@ class Swarm:
         given = array_of(where, self.task.action_mask(self.now))
         shape = self.masks.shape
         try:
-            self.masks[:] = np.broadcast_to(given, shape)
+            allowed = np.broadcast_to(given, shape)
         except ValueError:
-            given = given.astype(float)
-        if given.dtype != bool:
+            allowed = None
+        if allowed is None or given.dtype != bool:
             raise ParameterError(
                 f"{where} returns {given.dtype} of shape {given.shape}; it returns truth values, {shape}"
             )
+        self.masks[:] = allowed
         self.masks[~self.alive] = True
         for decoder, agents in self._choosers:
             for first, n in zip(np.cumsum([0, *decoder.sizes]), decoder.sizes, strict=False):

@@ -124,7 +124,10 @@ class Task:
         for name in self.reward:
             if name.startswith("_"):  # "_NAME" is the mask of NAME in the infos of vector environments
                 raise ParameterError(f"{where}: reward {name!r}: the name of a term does not begin with _")
-        _ = self.widths
+        if not any(map(sum, self.widths.values())):
+            raise ParameterError(
+                f"{where}: the observation has no numbers: the blocks that it observes have no entities"
+            )
         known = [b.name for b in self.blocks]
         for attribute, rule in (("policies", str), ("room", Whole())):
             for name, value in getattr(self, attribute).items():

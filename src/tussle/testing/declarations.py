@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import pickle
 from collections.abc import Iterator
+from types import FunctionType
 from typing import Any
 
 import numpy as np
@@ -24,7 +25,9 @@ HOOKS_NAMES = """
     awaits awaited with_files named_files named_teams stand_in only_calls_kernels
 """
 HOOKS = frozenset(HOOKS_NAMES.split())
-MACHINERY = frozenset({"columns", "services", "row_laws", "me_type", "world_types", "__signature__"})
+MACHINERY = frozenset(
+    {"columns", "services", "row_laws", "neighbor_laws", "me_type", "world_types", "__signature__"}
+)
 MUTABLE = (list, dict, set, bytearray, np.ndarray)
 MAGIC_NAMES = """
     __init__ __new__ __setattr__ __getattr__ __getattribute__ __delattr__ __eq__ __hash__ __reduce__
@@ -71,6 +74,7 @@ def _attributes(cls: type[Plugin]) -> Iterator[str]:
                 continue
             if isinstance(value, MUTABLE) and not name.startswith("__"):
                 yield f"{name} is a {type(value).__name__} on the class, which all simulations share; declare a column, or make it a tuple"
+            yield from _method(cls, name, value)
             if name in MAGIC and not (name == "__hash__" and value is None):
                 yield f"it defines {name}; only hooks may be defined ({listed(sorted(HOOKS & set(dir(cls))))})"
             kind = next(
@@ -78,6 +82,19 @@ def _attributes(cls: type[Plugin]) -> Iterator[str]:
             )
             if kind is not None and name not in HOOKS and not name.startswith("__"):
                 yield f"it overrides {kind.__name__}.{name}, which is not a hook ({listed(sorted(HOOKS & set(dir(cls))))})"
+
+
+def _method(cls: type[Plugin], name: str, value: Any) -> Iterator[str]:
+    """Finds methods that remember in a default, and those whose name has the letters of a hook in another order, which are not called."""
+    function = getattr(value, "__func__", value)
+    if not isinstance(function, FunctionType):
+        return
+    for default in (*(function.__defaults__ or ()), *(function.__kwdefaults__ or {}).values()):
+        if isinstance(default, MUTABLE):
+            yield f"an argument of {name} has a {type(default).__name__} as its default, which all calls share; declare a column"
+    hook = next((k for k in HOOKS & set(dir(cls)) if k != name and sorted(k) == sorted(name)), None)
+    if hook is not None and name not in HOOKS:
+        yield f"{name} is not a hook, and never called (did you mean {hook!r}?)"
 
 
 def _hooks(cls: type[Plugin]) -> Iterator[str]:

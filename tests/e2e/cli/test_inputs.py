@@ -108,6 +108,17 @@ def test_why_a_recording_is_not_whole_is_said_where_it_is_played_again(tmp_path,
         assert why in " ".join(text.split())
 
 
+def test_a_run_of_a_mission_made_in_python_says_how_it_is_played_again(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with Simulation(read_mission("predator_prey", {"run.end": 0.5}).mission, 1) as sim, Recorder(sim, "run"):
+        sim.run()
+    Path("run/mission.xml").unlink(missing_ok=True)
+    for place in ("run", "run:0"):
+        code, text = tussle("run", "--from", place, "--no-log")
+        assert code == 1
+        assert "the run has no mission.xml: its mission was made in Python" in " ".join(text.split())
+
+
 def test_a_flipped_bit_is_found(called):
     path = Path("run/inputs.arrow")
     data = bytearray(path.read_bytes())

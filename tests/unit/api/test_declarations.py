@@ -173,7 +173,13 @@ def test_a_plugin_is_a_value_and_has_no_arrays():
         (lambda: type("A", (Autonomy,), {"name": State()}), r"A.name: the name is reserved"),
         (lambda: type("A", (Autonomy,), {"_x": Param(1.0)}), r"A._x: the name is reserved"),
         (lambda: type("M", (Message,), {"x": State()}), r"M.x: a message field is a Field"),
-        (lambda: type("M", (Message,), {"sender": Field()}), r"M.sender: the name is reserved in messages"),
+        *(
+            (
+                lambda name=name: type("M", (Message,), {name: Field()}),
+                rf"M.{name}: .* reserved in messages, as are world, sender, ",
+            )
+            for name in ("world", "type", "data", "sender", *(k for k in dir(Messages) if k[0] != "_"))
+        ),
         (
             lambda: type("M", (Message,), {"a": Field(ragged=True), "b": Field(ragged=True)}),
             r"M has more than one ragged field",

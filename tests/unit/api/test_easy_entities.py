@@ -373,6 +373,9 @@ COLUMNS = {
     "n": State(dtype=int),
     "goal": State("x y z"),
     "target": EntityRef(),
+    "is_on": State(dtype=bool),
+    "flags": State("a b", dtype=bool),
+    "size_": State(),
     "size": Param(2, structural=True),
 }
 
@@ -393,6 +396,24 @@ COLUMNS = {
         (lambda self, me: setattr(me, "n", None), "Easy.n takes whole numbers, not None"),
         (lambda self, me: setattr(me, "n", math.nan), "Easy.n takes whole numbers, not nan"),
         (lambda self, me: setattr(me, "target", "prey"), "Easy.target takes an entity or None, not 'prey'"),
+        *(
+            (lambda self, me, i=i: setattr(me, "target", i), f"Easy.target takes an entity or None, not {i}")
+            for i in (-1, 1.5, True)
+        ),
+        (
+            lambda self, me: setattr(me, "target", 99),
+            "me.target: there has been no entity 99; the largest id",
+        ),
+        *(
+            (lambda self, me, v=v: setattr(me, "is_on", v), f"Easy.is_on takes true or false, not {v!r}")
+            for v in (2, -1.0, "yes", None, math.nan)
+        ),
+        (
+            lambda self, me: setattr(me, "flags", (True, 3)),
+            "Easy.flags takes true or false, not of shape (2,)",
+        ),
+        (lambda self, me: setattr(me, "size_", None), "Easy.size_ takes a number, not None"),
+        (lambda self, me: setattr(me, "goal", None), "Easy.goal takes 3 numbers (x, y, z), not None"),
         (lambda self, me: setattr(me, "t", 1.0), "me.t is read-only"),
         (lambda self, me: setattr(me.nearest(), "health", 0.0), "Easy: another entity is read-only"),
         (lambda self, me: me.draw.circle(), "there is no shape 'circle'"),
@@ -400,6 +421,18 @@ COLUMNS = {
 )
 def test_what_goes_wrong_is_said_in_the_authors_terms(step, text):
     assert text in failing(step, **COLUMNS)
+
+
+def test_truth_values_are_taken_as_what_is_equal_to_them():
+    def turn(self, me):
+        for given in (True, np.True_, 1, 1.0, np.array(True)):
+            me.is_on = False
+            me.is_on = given
+            me.n += me.is_on is True
+        me.flags = (0, 1.0)
+        me.n += me.flags.tolist() == [False, True]
+
+    assert (one_step(does(turn, **COLUMNS)()).read("a.Easy.n")[0] == 6).all()
 
 
 def test_structural_parameters_are_the_plugins():

@@ -326,6 +326,18 @@ COLUMNS = {
         (lambda self, w: setattr(w, "t", 1.0), "Judge: w.t is read-only"),
         (lambda self, w: setattr(w, "lost", 1), "Judge: lost has one value per team"),
         (lambda self, w: setattr(w, "age", 1), "Judge: age has one value per entity"),
+        (
+            lambda self, w: setattr(w.entities[0], "health", None),
+            "Judge: an entity's health takes a number, not None",
+        ),
+        (
+            lambda self, w: setattr(w.entities[0], "health", "good"),
+            "an entity's health takes a number, not 'good'",
+        ),
+        (
+            lambda self, w: setattr(w.entities[0], "force", (1, 2)),
+            "an entity's force takes three numbers, not (1, 2)",
+        ),
         (lambda self, w: setattr(w, "n", "many"), "Judge.n takes whole numbers, not 'many'"),
         (lambda self, w: setattr(w, "n", 1.5), "Judge.n takes whole numbers, not 1.5"),
         (lambda self, w: setattr(w, "n", math.nan), "Judge.n takes whole numbers, not nan"),

@@ -7,7 +7,7 @@ import pytest
 from small_worlds import block
 
 from tussle import Mission, Simulation
-from tussle.api import Autonomy, Controller, Input, MotionModel, Output, Param, State, row_law
+from tussle.api import Autonomy, Controller, EntityRef, Input, MotionModel, Output, Param, State, row_law
 from tussle.errors import DeclarationError, PluginError
 from tussle.numeric.kernel import device
 from tussle.numeric.quaternion import quat_from_euler
@@ -296,6 +296,25 @@ def test_names_that_mean_nothing_are_refused():
         DeclarationError, match=r"'turnrate' is no result of a row law .did you mean 'turn_rate'"
     ):
         declared(lambda yaw: yaw, "turnrate")
+    own = {
+        "n": State(dtype=int),
+        "on": State(dtype=bool),
+        "items": State(ragged=True),
+        "other": EntityRef(),
+        "k": Param(1.0),
+    }
+    kinds = {
+        "n": "State of int",
+        "on": "State of bool",
+        "items": "State of lists",
+        "other": "EntityRef of int",
+        "k": "Param of float",
+    }
+    for name in own:
+        with pytest.raises(
+            DeclarationError, match=f"'{name}' is no result of a row law, as a {kinds[name]}; "
+        ):
+            type("Bad", (Controller,), {**own, "law": row_law(name)(staticmethod(lambda yaw: yaw))})
     with pytest.raises(DeclarationError, match="'gains' is no result of a row law"):
         declared(lambda yaw: yaw, "gains")
     with pytest.raises(DeclarationError, match=r"name the results, such as @row_law\('turn_rate'\)"):
@@ -305,7 +324,7 @@ def test_names_that_mean_nothing_are_refused():
 def test_results_that_do_not_fit_are_refused_when_it_first_runs():
     with pytest.raises(PluginError, match=r"returns \(a number, a number\); its results are a number"):
         flown(game(declared(lambda yaw: (yaw, yaw), "turn_rate")(), DRIFTING), 1)
-    with pytest.raises(PluginError, match=r"<lambda>, .*: pitched cannot be compiled: "):
+    with pytest.raises(PluginError, match=r"<lambda> cannot be compiled: "):
         flown(game(declared(lambda yaw: sorted(str(yaw)), "turn_rate")(), DRIFTING), 1)
 
 

@@ -81,6 +81,74 @@ def test_defaults_are_those_of_their_columns():
         np.testing.assert_array_equal(simulation.read("Own.pair")[0], [[1.5, math.nan]] * 2)
 
 
+class Parent(Autonomy):
+    """A plugin that others inherit from."""
+
+    top = Param(3.0)
+    memory = State()
+    velocity = Output("velocity_x velocity_y velocity_z", unit="m/s")
+
+
+def nothing(self, g):
+    """Do nothing."""
+
+
+async def later(self, g):
+    """Do nothing, later."""
+
+
+async def later_and_later(self, g):
+    """Do nothing, again and again."""
+    yield
+
+
+def piece_by_piece(self, g):
+    """Do nothing by and by."""
+    yield
+
+
+NO_CALL = "a call does nothing"
+OVERRIDES = {
+    "a number in place of a parameter": ({"top": 4.0}, r"Own.top = 4.0 hides the Param of Parent; .* top = Param\(4.0, ...\)"),
+    "None in place of a parameter": ({"top": None}, "Own.top = None hides the Param of Parent"),
+    "a method in place of a state": ({"memory": nothing}, "Own.memory = .* hides the State of Parent; choose another name"),
+    "a property in place of an output": ({"velocity": property(len)}, "Own.velocity = .* hides the Output of Parent"),
+    "a method without g": ({"step": lambda self: None}, r"test_what_.*py:\d+: <lambda> takes \(self\); it is called with \(self, g\)"),
+    "a method with too much": ({"spawn": nothing}, r"nothing takes \(self, g\); it is called with \(self, g, rows\)"),
+    "a coroutine": ({"step": later}, f"later: with `async def` {NO_CALL}"),
+    "an asynchronous generator": ({"step": later_and_later}, f"later_and_later: with `async def` {NO_CALL}"),
+    "a generator": ({"step": piece_by_piece}, f"piece_by_piece: with `yield` {NO_CALL}"),
+    **{
+        f"a column called {name}": ({name: Param(1.0)}, f"Own.{name}: .* choose another name for this Param")
+        for name in dir(Autonomy)
+        if not name.startswith("__") and name not in ("grade", "kind")
+    },
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", OVERRIDES)
+def test_what_a_class_may_not_write_over(name):
+    own, text = OVERRIDES[name]
+    with pytest.raises(DeclarationError, match=text):
+        type("Own", (Parent,), own)
+
+
+@pytest.mark.parametrize(
+    "own",
+    [
+        {"top": Param(4.0)},
+        {"step": lambda self, view: None},
+        {"step": lambda self, g, memo=None: None},
+        {"step": lambda self, *views: None},
+        {"replace": lambda self, **values: self},
+        {"named_regions": lambda self: iter(())},
+        {"helper": later},
+    ],
+)
+def test_what_a_class_may_write_over(own):
+    assert type("Own", (Parent,), own)().values["top"] == getattr(own.get("top"), "default", 3.0)
+
+
 @pytest.mark.parametrize("radius", [-1.0, math.nan, None, True, (30.0,), "number", "whole"])
 def test_the_radius_of_a_law_is_a_real_number(radius):
     def alone(distance):
@@ -132,6 +200,13 @@ def looks(look):
             for ids in ([1], list(range(9)), [1.5] * 5, 3, ["a"] * 5, np.ones((5, 1), int))
         ),
         (lambda w: w.rows_at([0, 0], [1]), r"ids = an array of int64, \(1,\) is not allowed; it takes whole numbers, \(2,\)"),
+        (lambda w: w.move([0], pos=1.0), r"w.move: pos has shape \(\); it takes \(3, 1\)"),
+        (lambda w: w.move([0], pos="east"), "w.move: pos = 'east' is not allowed; it takes numbers"),
+        (lambda w: w.move([0], vel=[None, 1, 2]), r"w.move: vel = \[None, 1, 2\] is not allowed; it takes numbers"),
+        (lambda w: w.move([0], vel=[[1], [2, 3], [4]]), "w.move: vel = .* is not allowed; it takes numbers"),
+        (lambda w: w.uniform_by("a", [0.5], [1], [2]), "numbers of the draw 'a' = .* is not allowed; it takes whole numbers"),
+        (lambda w: w.normal_by("a", 0, "x", 2), "numbers of the draw 'a' = 'x' is not allowed; it takes whole numbers"),
+        (lambda w: w.inbox(int), "w.inbox: <class 'int'> is not allowed; it takes a message type"),
         (lambda w: w.rows_at([1], [1]), "rows_at: world = 1 is not allowed; it takes whole numbers from 0 to 0"),
     ],
 )  # fmt: skip

@@ -358,6 +358,34 @@ def test_a_network_without_a_route_is_told_so():
         Simulation(game).step()
 
 
+@pytest.mark.parametrize(
+    ("route", "text"),
+    [
+        ((0, 6), r"Own.route: rows = 6 is not allowed; it takes whole numbers from 0 to 5"),
+        ((0, -1), r"Own.route: rows = -1, as of a removed entity, is not allowed"),
+        ((0, 0.5), r"Own.route: rows = an array of float64, \(1,\) is not allowed"),
+        ((4, 0), r"Own.route: message numbers = 4 is not allowed; it takes whole numbers from 0 to 3"),
+        (([0, 1], [2]), r"Own.route: 2 message numbers and 1 rows; it returns one row per message number"),
+        (
+            (0, 5),
+            r"Own.route: message 0, of world 0, goes to row 5, of world 1; messages stay in their world",
+        ),
+        (([0, 3], [1, 0]), r"Own.route: message 3, of world 1, goes to row 0, of world 0"),
+        ("none", r"Own.route returned 'none'; it must return EVERYONE"),
+    ],
+)
+def test_a_route_that_cannot_be_is_told_of_the_network(route, text):
+    class Own(Network):
+        def route(self, w, messages):
+            return route
+
+    game = mission(
+        still("a", Talker(network="Own"), count=2), still("b", Listener(network="Own")), networks=[Own()]
+    )
+    with pytest.raises(PluginError, match=f"^Own, step 0: {text}"):
+        Simulation(game, seeds=[1, 2]).run()
+
+
 class Sender(Autonomy):
     deliveries = Publish(Delivery)
 

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 import numpy as np
 import pytest
 from small_worlds import block
 
 from tussle import Mission, Simulation
-from tussle.api import Autonomy, EasyAutonomy, MotionModel, Output, Param, State
+from tussle.api import Autonomy, EasyAutonomy, Input, MotionModel, Output, Param, State
 from tussle.errors import ParameterError
+from tussle.numeric import cos, sin
+from tussle.plan import Problem, solve
 from tussle.stock import Unicycle
 
 MODEL = Unicycle(vel_max=20.0)
@@ -92,3 +96,49 @@ def test_a_list_of_another_length_than_the_stack_is_refused() -> None:
     game = Mission(blocks=[block(autonomy=Planner(), motion=MODEL)])
     with pytest.raises(ParameterError, match=r"'a.Unicycle.vel_max' has 2 values for 3 worlds"):
         Simulation(game, seeds=[1, 2, 3], params={"a.Unicycle.vel_max": [1.0, 2.0]})
+
+
+class Drifting(Unicycle):
+    """A unicycle with a current that nobody has to command."""
+
+    x = State("x y z yaw pitch", unit="m m m rad rad")
+    current = Input(unit="m/s", optional=True, default=0.7)
+
+    advance = MotionModel.advance
+    row_laws: ClassVar[dict] = {}
+
+    @staticmethod
+    def derivative(yaw, speed, turn_rate, current):
+        return speed * cos(yaw), speed * sin(yaw) + current, 0.0, turn_rate, 0.0
+
+
+def test_a_plan_has_the_defaults_of_inputs_that_no_command_sets():
+    plan = solve(
+        Problem(
+            motion=Drifting(vel_max=5.0),
+            start={"x": 1.0},
+            goal=(20.0, 10.0, 0.0),
+            goal_radius=3.0,
+            bounds={"x": (0, 40), "y": (-20, 20)},
+            commands={"speed": (1.0, 5.0), "turn_rate": (-1.0, 1.0)},
+            held={"pitch_rate": 0.0},
+            dt=0.1,
+        ),
+        seed=1,
+    )
+    assert plan.is_solved
+
+    class Follow(Autonomy):
+        speed = Output(unit="m/s")
+        turn_rate = Output(unit="rad/s")
+        pitch_rate = Output(unit="rad/s")
+
+        def step(self, g):
+            self.speed[:], self.turn_rate[:] = plan.inputs[int(g.step_count[0]), :2]
+
+    game = Mission(
+        blocks=[block(position=(1, 0, 0), autonomy=Follow(), motion=Drifting(vel_max=5.0))], end=99.0
+    )
+    with Simulation(game) as simulation:
+        simulation.step(len(plan.inputs))
+        assert simulation.read("a.Drifting.x")[0][0, 0].tobytes() == plan.path[-1].tobytes()

@@ -55,6 +55,55 @@ def test_a_missing_writer_is_told_with_what_is_there_and_what_would_fit():
     assert text.endswith(": UnicyclePID")
 
 
+class Looker(Autonomy):
+    marks = Output()
+    speed = Output(unit="m/s")
+    turn_rate = Output(unit="rad/s")
+    pitch_rate = Output(unit="rad/s")
+
+    def step(self, g):
+        """Do nothing."""
+
+
+class Reader(Autonomy):
+    marks = Input()
+    speed = Output(unit="m/s")
+    turn_rate = Output(unit="rad/s")
+    pitch_rate = Output(unit="rad/s")
+
+    def step(self, g):
+        """Do nothing."""
+
+
+class Steerer(Controller):
+    marks = Input()
+    speed = Output(unit="m/s")
+    turn_rate = Output(unit="rad/s")
+    pitch_rate = Output(unit="rad/s")
+
+    def step(self, g):
+        """Do nothing."""
+
+
+@pytest.mark.parametrize(
+    ("plugins", "text"),
+    [
+        (
+            {"autonomy": [Looker(), Reader()]},
+            "for Reader; .*; Looker writes it, but autonomies read those of sensors",
+        ),
+        (
+            {"autonomy": Looker(), "controller": [Steerer(), Steerer(name="second")]},
+            "for second; .*; Looker writes it, but a controller reads those of sensors, and of what stands before it",
+        ),
+        ({"autonomy": Reader()}, "for Reader; written channels: none$"),
+    ],
+)
+def test_who_writes_a_channel_at_another_place_is_told(plugins, text):
+    with pytest.raises(WiringError, match=f"no plugin writes channel 'marks' {text}"):
+        Simulation(mission(block(motion=Unicycle(), **plugins)))
+
+
 def test_a_controller_without_its_input_is_named():
     with pytest.raises(WiringError, match=r"channel 'desired_altitude' for UnicyclePID"):
         Simulation(mission(block(controller=UnicyclePID(), motion=Unicycle())))

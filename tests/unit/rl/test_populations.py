@@ -12,10 +12,12 @@ from tussle.rl import (
     Act,
     Computed,
     Dispersal,
+    Each,
     NearestOthers,
     NearOrigin,
     Own,
     PredatorsAndPrey,
+    Term,
     evaluate,
     make,
     make_swarm,
@@ -176,6 +178,7 @@ def test_a_mask_of_ones_own_reaches_one_agent():
             lambda self, now: np.ones((1, 7), bool),
             r"action_mask returns .* of shape \(1, 7\); it returns truth values, \(1, 1, 2\)",
         ),
+        (lambda self, now: np.ones((1, 7), bool), r"action_mask returns bool of shape \(1, 7\)"),
         (lambda self, now: np.ones((1, 1, 2)), "action_mask returns float64"),
         (lambda self, now: np.zeros((1, 1, 2), bool), "leaves robot_0 in world 0 no level"),
     ],
@@ -193,6 +196,11 @@ def test_declarations_that_cannot_be_are_refused():
         Flee(state=3)
     with pytest.raises(ParameterError, match=r"policies: there is no block 'preys'.*prey"):
         Flee(policies={"preys": "a"})
+    empty = [b.replace(count=0) if b.name == "hunters" else b for b in Flee().given.blocks]
+    with pytest.raises(
+        ParameterError, match="the observation has no numbers: the blocks that it observes have no"
+    ):
+        Flee(mission=Flee().given.replace(blocks=empty), observation=Each("hunters"))
     with pytest.raises(ParameterError, match="observation of 'prey' is empty"):
         Flee(observation={"near": (NearestOthers(2),), "own": ()})
     with pytest.raises(
@@ -251,3 +259,24 @@ def test_blocks_have_policies():
     with pytest.raises(ParameterError, match="no agent 'prey_100'"):
         task.policy_of("prey_100")
     assert evaluate(task.replace(time_limit=1.0), n_episodes=1).keys() == {"captures", "captured", "return"}
+
+
+@pytest.mark.parametrize(
+    "shared",
+    [
+        lambda now: now.pos,
+        lambda now: now.yaw,
+        lambda now: now.nearest().distance,
+        lambda now: now.nearest().offset,
+        lambda now: now.nearest("hunters", k=2).found,
+        lambda now: now.n_within(50.0),
+    ],
+)
+def test_no_term_changes_what_the_others_see(shared):
+    def changing(now):
+        shared(now)[:] = 1.0
+
+    swarm = make_swarm(Flee(reward={"changing": Term(changing)}))
+    swarm.reset(seed=1)
+    with pytest.raises(ValueError, match="read-only"):
+        swarm.step(np.zeros((1, len(swarm.task.agent_names), 2), np.float32))

@@ -15,6 +15,7 @@ from tussle.api.easy.values import (
     Columns,
     ReceivedMessage,
     Write,
+    check_id,
     with_ids,
     write_number,
 )
@@ -93,19 +94,6 @@ def whole_id(called: str, number: Any) -> int:
             f"{called}: {number!r} is no id; ids are whole numbers from 1 on, and 0 is nobody"
         )
     return int(number)
-
-
-def check_id(called: str, number: Any, context: Any, world: int) -> None:
-    """See that an entity with an id has been in a world.
-
-    Raises:
-        ParameterError: None has.
-    """
-    largest = int(context.simulation().state.births.next_id[world]) - 1
-    if number > largest:
-        raise ParameterError(
-            f"{called}: there has been no entity {number!r}; the largest id so far is {largest}"
-        )
 
 
 def squared_distance(a: Entity, b: Entity) -> float:

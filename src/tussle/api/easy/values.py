@@ -79,6 +79,8 @@ def writer(name: str, column: Column) -> Write | None:
         return None
     if column.dtype is int and not is_list(column):
         return _write_wholes if column.fields else _write_whole
+    if column.dtype is bool and not is_list(column):
+        return _write_truths if column.fields else _write_truth
     return _write_several if column.fields or is_list(column) else write_number
 
 
@@ -88,7 +90,7 @@ def write_number(of: Any, name: str, value: Any) -> None:
         of._cells[name][of._row] = value
     except (TypeError, ValueError):
         try:
-            of._own[name][of._row] = value
+            of._own[name][of._row] = float("" if value is None else value)  # NumPy takes None for NaN
         except (TypeError, ValueError):
             raise _wrong_value(of, name, value, "a number") from None
 
@@ -116,9 +118,27 @@ def _write_wholes(of: Any, name: str, value: Any) -> None:
     _write_several(of, name, value)
 
 
+def _write_truth(of: Any, name: str, value: Any) -> None:
+    """Setter of a column of one truth value."""
+    if type(value) is bool:
+        of._cells[name][of._row] = value
+    else:
+        _write_truths(of, name, value)
+
+
+def _write_truths(of: Any, name: str, value: Any) -> None:
+    """Setter of a column of truth values."""
+    given = np.asarray(value)
+    if given.dtype.kind != "b" and not (
+        given.dtype.kind in "iuf" and bool(((given == 0) | (given == 1)).all())
+    ):
+        raise _wrong_value(of, name, value, "true or false")
+    _write_several(of, name, value)
+
+
 def _write_several(of: Any, name: str, value: Any) -> None:
     try:
-        of._own[name][..., of._row] = value
+        of._own[name][..., of._row] = "" if value is None else value  # NumPy takes None for NaN
     except (TypeError, ValueError):
         fields = type(of._shared.plugin).columns[name].fields
         wanted = f"{len(fields)} numbers ({', '.join(fields)})" if fields else "a whole number"
@@ -131,10 +151,26 @@ def _wrong_value(of: Any, name: str, value: Any, wanted: str) -> ParameterError:
     return ParameterError(f"{type(of._shared.plugin).__name__}.{name} takes {wanted}, not {given}")
 
 
+def check_id(called: str, number: Any, context: Any, world: int) -> None:
+    """See that an entity with an id has been in a world.
+
+    Raises:
+        ParameterError: None has.
+    """
+    largest = int(context.simulation().state.births.next_id[world]) - 1
+    if number > largest:
+        raise ParameterError(
+            f"{called}: there has been no entity {number!r}; the largest id so far is {largest}"
+        )
+
+
 def _write_reference(of: Any, name: str, value: Any) -> None:
     number = 0 if value is None else getattr(value, "_id", value)
-    if type(number) is not int:
+    if type(number) is not int or number < 0:
         raise _wrong_value(of, name, value, "an entity or None")
+    if number is value:  # an id
+        view = of._shared.g
+        check_id(f"{of._called}.{name}", number, view.context, int(view.world[of._row]))
     of._own[name][of._row] = number
 
 

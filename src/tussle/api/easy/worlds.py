@@ -12,14 +12,23 @@ from tussle.api.easy.entities import (
     Entity,
     Observer,
     Other,
-    check_id,
     public_names,
     squared_distance,
     whole_id,
 )
 from tussle.api.easy.search import Search
 from tussle.api.easy.shared import RandomNumbers, WorldDraw
-from tussle.api.easy.values import BODY, Cells, Columns, ReceivedMessage, Write, make_type, with_ids
+from tussle.api.easy.values import (
+    BODY,
+    VECTORS,
+    Cells,
+    Columns,
+    ReceivedMessage,
+    Write,
+    check_id,
+    make_type,
+    with_ids,
+)
 from tussle.api.world import WorldView
 from tussle.arguments import explained
 from tussle.declare.columns import Column, State
@@ -90,7 +99,12 @@ class Member(Observer, Other):
         if write is not None:
             write(self, name, value)
         elif name in IN_PLACE:
-            getattr(self._shared.bodies, name)[..., self._row] = value
+            try:  # NumPy takes None for NaN
+                getattr(self._shared.bodies, name)[..., self._row] = "" if value is None else value
+            except (TypeError, ValueError):
+                self._refuse(
+                    f"an entity's {name} takes {'three numbers' if name in VECTORS else 'a number'}, not {value!r:.60}"
+                )
         elif name in BODY:
             self._refuse(
                 f"{name} of an entity is read-only; w.move(entity, pos=...) changes pos, vel and quat"

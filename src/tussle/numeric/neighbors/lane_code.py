@@ -28,7 +28,7 @@ from tussle.errors import DeclarationError
 from tussle.numeric.kernel import Device, device
 from tussle.numeric.neighbors import lanes
 from tussle.numeric.neighbors.lane_count import LANES
-from tussle.numeric.rk4 import label
+from tussle.numeric.refusals import label
 from tussle.numeric.source import define, indented
 
 ARITHMETIC = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/"}

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from tussle.errors import DeclarationError, listed, nearest_name
-from tussle.numeric.rk4 import label
+from tussle.numeric.refusals import label
 
 REDUCTIONS = ("sum", "mean", "min", "max", "count", "nearest", "each")
 PAIR = ("offset_x", "offset_y", "offset_z", "distance", "distance_squared", "inverse_distance")

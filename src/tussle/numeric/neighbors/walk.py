@@ -22,7 +22,7 @@ from tussle.numeric.neighbors.lanes import bits, choose, load, pack
 from tussle.numeric.neighbors.law import Law
 from tussle.numeric.neighbors.walk_python import walk_in_python
 from tussle.numeric.neighbors.walk_text import Part, WalkText
-from tussle.numeric.rk4 import label
+from tussle.numeric.refusals import label
 from tussle.numeric.source import define
 
 

@@ -43,7 +43,8 @@ class Problem:
         goal_radius: The goal is reached at this distance [m].
         bounds: State field -> its least and largest allowed value; x, y and z that are not named are not bounded.
         commands: Input -> its least and largest value.
-        held: Other inputs, for instance forces or mass, that have a constant value other than 0.
+        held: Other inputs, for instance forces or mass, that have a constant value; by default that of an optional input is its default,
+            and that of others 0.
         scene: Obstacles.
         radius: The vehicle is a sphere of this radius [m].
         dt: Length of a step [s], as in the mission.
@@ -162,6 +163,13 @@ class Problem:
         return (*self.motion.input_channels(), *self.motion.body_inputs())
 
     @cached_property
+    def _held(self) -> np.ndarray:
+        """Values of the inputs, (k,), where no command sets them."""
+        optional = [column for column in type(self.motion).inputs().values() if column.optional]
+        rest = {name: column.default for column in optional for name in column.channels}
+        return np.array([float({**rest, **self.held}.get(name, 0.0)) for name in self.inputs])
+
+    @cached_property
     def first(self) -> np.ndarray:
         """The initial state, (m,)."""
         return np.array([self.start.get(name, 0.0) for name in self.fields])
@@ -180,9 +188,7 @@ class Problem:
 
     def whole(self, commands: np.ndarray) -> np.ndarray:
         """All inputs, (k, n), from those that are planned, (c, n)."""
-        u = np.zeros((len(self.inputs), commands.shape[1]))
-        for name, value in self.held.items():
-            u[self.inputs.index(name)] = value
+        u = np.repeat(self._held[:, None], commands.shape[1], axis=1)
         u[[self.inputs.index(name) for name in self.commands]] = commands
         return u
 
