@@ -96,26 +96,41 @@ def _explained(function: Decorated, error: type[TussleError]) -> Decorated:
     return call  # type: ignore[return-value]
 
 
-def checked(function: Decorated) -> Decorated:
-    """A function that checks its arguments by their annotations before it runs, for what would be noticed later or never.
+def checked(*names: str) -> Callable[[Decorated], Decorated]:
+    """Decorator of a function whose arguments with these names are checked by their annotations before it runs.
 
-    Its calls raise a `ParameterError`: an argument is of another type.
+    It is for what would be noticed late or never: truth values, and what is used later. Calls raise a `ParameterError`.
     """
 
-    @functools.wraps(function)
-    def call(*args: Any, **kwargs: Any) -> Any:
-        if wrong := _better(function, args, kwargs, ParameterError):
-            raise wrong
-        return function(*args, **kwargs)
+    def decorate(function: Decorated) -> Decorated:
+        signature = inspect.signature(function)
 
-    return call  # type: ignore[return-value]
+        @functools.wraps(function)
+        def call(*args: Any, **kwargs: Any) -> Any:
+            try:
+                given = signature.bind(*args, **kwargs).arguments
+            except TypeError:
+                return function(*args, **kwargs)  # which raises it
+            for each in names:
+                if each in given:
+                    check_kind(f"{_called(function, args)}: {each}", given[each], kinds_of(function)[each])
+            return function(*args, **kwargs)
+
+        return call  # type: ignore[return-value]
+
+    return decorate
+
+
+def _called(function: Callable[..., Any], args: tuple[Any, ...]) -> str:
+    """Name of a function, or of the class that it makes, for messages."""
+    return type(args[0]).__name__ if function.__name__ == "__init__" else function.__name__
 
 
 def _better(
     function: Callable[..., Any], args: Any, kwargs: Any, error: type[TussleError]
 ) -> TussleError | None:
-    """An error that says which argument is wrong, if there is one."""
-    name = type(args[0]).__name__ if function.__name__ == "__init__" else function.__name__
+    """A better error, if an argument explains why a call failed."""
+    name = _called(function, args)
     signature = inspect.signature(function)
     known = [each for each in signature.parameters if each not in ("self", "cls")]
     try:

@@ -95,7 +95,7 @@ class Batch:
         MissionError: There is no such mission, or it cannot be played at one of the points.
     """
 
-    @checked
+    @checked("independent", "ends_by_time")
     def __init__(
         self,
         mission: str | Path | Mission | Callable[..., Mission],

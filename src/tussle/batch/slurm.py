@@ -14,7 +14,7 @@ from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
-from tussle.arguments import checked
+from tussle.arguments import checked, explained
 from tussle.batch.dask_runner import OnDask, connect, missing_extra
 from tussle.batch.executors import Executor
 from tussle.documents import is_count
@@ -119,7 +119,8 @@ def executor_for(scheduler: str | None, slurm: str | None, stack: int | None) ->
             yield OnDask(client, stack)
 
 
-@checked
+@explained
+@checked("jobs")
 @contextmanager
 def on_slurm(jobs: Jobs | str, stack: int | None = None) -> Iterator[OnDask]:
     """An executor on jobs of Slurm. They are submitted here, and cancelled when the context ends.

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from tussle.arguments import checked
+from tussle.arguments import checked, explained
 from tussle.engine.simulation import Simulation
 from tussle.errors import MissingExtraError
 from tussle.mission import Mission
@@ -40,7 +40,8 @@ class GivenGame:
         return self.study.failing_mission(StressGame(self.seed))
 
 
-@checked
+@explained
+@checked("specification")
 def given_games(
     mission: str | Path | Mission,
     specification: str | Function,

@@ -80,7 +80,7 @@ class Stress:
         MissionError: The mission cannot be read.
     """
 
-    @checked
+    @checked("specification", "ends_by_time")
     def __init__(
         self,
         mission: str | Path | Mission,

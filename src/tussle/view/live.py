@@ -85,7 +85,7 @@ class Live:
         ParameterError: A value is not allowed.
     """
 
-    @checked
+    @checked("threaded", "is_paused", "is_followed", "ground_map")
     def __init__(
         self,
         simulation: Simulation,

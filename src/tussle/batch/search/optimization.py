@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tussle.arguments import checked
+from tussle.arguments import explained
 from tussle.batch.design_points import check_source, with_whole_numbers
 from tussle.batch.executors import Executor
 from tussle.batch.quantities import Quantity
@@ -260,7 +260,7 @@ class Optimization:
         progress.best = best_of(done, self.is_minimized)
 
 
-@checked
+@explained
 def optimize(
     mission: str | Path | Mission | Callable[..., Mission],
     objective: str,
