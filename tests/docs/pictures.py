@@ -1,4 +1,4 @@
-"""Makes the pictures of the terminal and of the report: python tests/docs/pictures.py."""
+"""Makes the pictures of the terminal, of the report and of the page on plots: python tests/docs/pictures.py."""
 
 from __future__ import annotations
 
@@ -17,6 +17,16 @@ BATCH = (
     "batch predator_prey --vary keepers.Predator.max_speed=25:45 --vary run.update=sequential,synchronous"
     " --sample product --samples 4 --runs 10 --end 60 --out games"
 )
+
+HUNT = "run predator_prey --seed 3 --end 300 --out hunt"
+PLOTS = {
+    "trajectory": "--kind trajectory --team 2 --team 3",
+    "left": "--kind left",
+    "altitude": "--kind altitude --team 1",
+    "distance-3-109": "--between 3 109",
+    "density": "--kind density --team 1",
+}
+"""Name of each plot of the page -> how it is drawn there."""
 
 
 def called(command: str, width: int) -> str:
@@ -53,6 +63,10 @@ def main() -> None:
         page.goto(Path("games/report/index.html").resolve().as_uri())
         page.screenshot(path=IMAGES / "report.png", timeout=300_000)
         browser.close()
+        called(HUNT, 80)
+        for name, how in PLOTS.items():
+            called(f"plot hunt {how}", 80)
+            shutil.copy(f"hunt/plots/{name}.png", IMAGES / f"plot-{name.partition('-')[0]}.png")
 
 
 if __name__ == "__main__":

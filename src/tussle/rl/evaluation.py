@@ -73,7 +73,7 @@ def interval(returns: np.ndarray) -> tuple[float, float, float]:
 
 
 class Board:
-    """Shows a training in TensorBoard.
+    """Writes the curve of a training for TensorBoard.
 
     Args:
         folder: Gets the event files.
