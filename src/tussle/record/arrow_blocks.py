@@ -33,7 +33,7 @@ MAX_SEARCHED = 128_000_000
 """Number of bytes behind a damaged block in which the next intact one is searched, far more than a block has: a file may seem enormous."""
 MAX_SEARCH = 8
 """Bytes that the search for intact blocks behind damaged ones may read, per byte of the file: a file can be made to be slow to search."""
-_START = re.compile(rb"\xff{4}(?=[\s\S]{3}\x00)")
+_START = re.compile(rb"\xff\xff\xff\xff(?=[\s\S]{3}\x00)")  # not \xff{4}, which is searched 15 times slower
 """Beginning of a message whose metadata is not longer than MAX_HEAD."""
 
 
