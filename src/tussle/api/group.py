@@ -493,6 +493,7 @@ class GroupView:
         self._differs("draws", label)
         draw = self._caller.instance_name if self._caller is not None else "", label
         self.context.streams.add(draw)
+        self.context.has_chance = True
         return draw
 
     def _keyed_seeds(self, draw: tuple[str, str]) -> np.ndarray:
