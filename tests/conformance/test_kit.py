@@ -477,6 +477,13 @@ class MisspellsAHook(SoundAutonomy):
         """Never called."""
 
 
+class MisspellsAHookByALetter(SoundAutonomy):
+    """Has a method that is never called."""
+
+    def spown(self, g, rows):
+        """Never called."""
+
+
 class RemembersById(SoundAutonomy):
     """Remembers outside of columns by entity, so that stacks do not show it, but a second game does."""
 
@@ -886,6 +893,7 @@ BROKEN = {
     "declarations": [
         RemembersInADefault,
         MisspellsAHook,
+        MisspellsAHookByALetter,
         NoDoc,
         ListOnClass,
         NotAHook,
