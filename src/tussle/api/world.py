@@ -49,6 +49,8 @@ class WorldView(GroupView):
         start_pos: Positions at the start of the step [m], (3, n), for plugins with `reads_start_positions`.
     """
 
+    _called = "w"
+
     def __init__(self, bodies: Bodies, context: Context) -> None:
         super().__init__(bodies, 0, bodies.n, context, context.clock.dt)
         self.only: np.ndarray | None = None  # worlds this call acts on, (n_worlds,); None for all
