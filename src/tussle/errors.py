@@ -142,6 +142,19 @@ def nearest_name(wrong: str, allowed: Iterable[str]) -> str:
     return f" (did you mean {folded[close[0]]!r}?)" if close else ""
 
 
+def slip_of(name: str, known: Iterable[str]) -> str | None:
+    """The known name that another one differs from by one letter, or by the order of its letters; None if there is none."""
+
+    def is_slip(one: str) -> bool:
+        less, more = sorted((name, one), key=len)
+        if len(less) == len(more):
+            return sorted(less) == sorted(more) or sum(a != b for a, b in zip(less, more, strict=True)) == 1
+        return len(more) - len(less) == 1 and any(more[:i] + more[i + 1 :] == less for i in range(len(more)))
+
+    names = list(known)
+    return None if name in names else next(filter(is_slip, names), None)
+
+
 def listed(names: Iterable[str]) -> str:
     """List names in the given order: "there are: a, b, c", or "there are none"."""
     text = ", ".join(names)

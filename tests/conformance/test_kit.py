@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 import random
+from collections import deque
+from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -475,6 +477,13 @@ class MisspellsAHook(SoundAutonomy):
         """Never called."""
 
 
+class MisspellsAHookByALetter(SoundAutonomy):
+    """Has a method that is never called."""
+
+    def spown(self, g, rows):
+        """Never called."""
+
+
 class RemembersById(SoundAutonomy):
     """Remembers outside of columns by entity, so that stacks do not show it, but a second game does."""
 
@@ -531,6 +540,47 @@ class ChangesClass(SoundAutonomy):
 
     def step(self, g: GroupView) -> None:
         type(self).count = 1
+
+
+class Notes:
+    """Any object."""
+
+
+class GrowsOnClass(SoundAutonomy):
+    """Remembers on the class, in what is neither a list nor a dict, and never uses it."""
+
+    calls: ClassVar = deque()
+
+    def step(self, g: GroupView) -> None:
+        self.calls.append(1)
+
+
+class GrowsInsideATuple(GrowsOnClass):
+    """Remembers in a list that something else holds."""
+
+    calls: ClassVar = ([],)
+
+    def step(self, g: GroupView) -> None:
+        self.calls[0].append(1)
+
+
+class GrowsAnObject(GrowsOnClass):
+    """Remembers in an object."""
+
+    calls: ClassVar = Notes()
+
+    def step(self, g: GroupView) -> None:
+        self.calls.n = getattr(self.calls, "n", 0) + 1
+
+
+class GrowsAndUses(GrowsOnClass):
+    """Remembers on the class, so that stacks differ."""
+
+    calls: ClassVar = deque()
+
+    def step(self, g: GroupView) -> None:
+        self.calls.append(1)
+        self.speed[:] = 1.0 / len(self.calls)
 
 
 class WritesView(SoundAutonomy):
@@ -843,6 +893,7 @@ BROKEN = {
     "declarations": [
         RemembersInADefault,
         MisspellsAHook,
+        MisspellsAHookByALetter,
         NoDoc,
         ListOnClass,
         NotAHook,
@@ -871,7 +922,15 @@ BROKEN = {
         EasyReadsAll,
         EasyBothLaws,
     ],
-    "memory in columns": [HidesAttribute, ChangesClass, EasyHides],
+    "memory in columns": [
+        HidesAttribute,
+        ChangesClass,
+        EasyHides,
+        GrowsOnClass,
+        GrowsInsideATuple,
+        GrowsAnObject,
+        GrowsAndUses,
+    ],
     "own columns": [WritesAroundView, WritesParameter, WritesWrongColumn, EasyHurts],
     "finite": [NanAtBound, NanInReferee, RaisesAtBound, EasyNan],
     "rollout": [RolloutOfItsOwn],
@@ -912,6 +971,12 @@ def test_evidence_says_seed_step_and_column() -> None:
         check_plugin(NanAtBound)
     with pytest.raises(ConformanceError, match=r"step wrote into vel, which is not its own"):
         check_plugin(WritesAroundView)
+
+
+@pytest.mark.parametrize("cls", [GrowsOnClass, GrowsInsideATuple, GrowsAnObject, GrowsAndUses])
+def test_the_attribute_that_grows_is_named(cls) -> None:
+    with pytest.raises(ConformanceError, match=rf"{cls.__name__}.calls changed during a game"):
+        check_plugin(cls)
 
 
 def test_what_is_external_promises_no_bits() -> None:

@@ -72,6 +72,7 @@ class Context:
         is_interrupted: Whether the user asked to stop; a plugin that waits for others then waits no longer.
         redraws: Draws with keys of their own; of several that name a draw, the last one counts.
         streams: Plugin and label of each random stream that has been drawn from.
+        has_chance: Whether anything after the births has drawn or read the seeds.
     """
 
     clock: Clock
@@ -98,6 +99,7 @@ class Context:
     later: list[Any] | None = None
     redraws: list[Redraw] = field(default_factory=list)
     streams: set[tuple[str, str]] = field(default_factory=set)
+    has_chance: bool = False
     _pool: ThreadPoolExecutor | None = None
 
     def __post_init__(self) -> None:

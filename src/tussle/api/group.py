@@ -54,6 +54,7 @@ class GroupView:
     """
 
     is_subset = False
+    _called = "g"  # as hooks name it
     failing_row: int | None
 
     def __init__(self, bodies: Bodies, first: int, last: int, context: Context, dt: float) -> None:
@@ -105,7 +106,8 @@ class GroupView:
             self._seen.add(name)
             return self._seeds
         allowed = [*FLOATS, *INTS, *DERIVED, "t", "dt", "n"]
-        raise AttributeError(f"g has no {name!r}{nearest_name(name, allowed)}; {listed(allowed)}")
+        every = [*allowed, *(k for k in dir(type(self)) if not k.startswith("_"))]
+        raise AttributeError(f"{self._called} has no {name!r}{nearest_name(name, every)}; {listed(allowed)}")
 
     def _derive(self, name: str) -> np.ndarray:
         kept = self._derived.get(name)
@@ -493,6 +495,7 @@ class GroupView:
         self._differs("draws", label)
         draw = self._caller.instance_name if self._caller is not None else "", label
         self.context.streams.add(draw)
+        self.context.has_chance = True
         return draw
 
     def _keyed_seeds(self, draw: tuple[str, str]) -> np.ndarray:

@@ -34,6 +34,8 @@ class MotionBody(GroupView):
             belong to this view; for kernels.
     """
 
+    _called = "body"
+
     def reset(self, bodies: Bodies, first: int, last: int) -> None:
         super().reset(bodies, first, last)
         self.span = (0, self.n)

@@ -49,6 +49,8 @@ class WorldView(GroupView):
         start_pos: Positions at the start of the step [m], (3, n), for plugins with `reads_start_positions`.
     """
 
+    _called = "w"
+
     def __init__(self, bodies: Bodies, context: Context) -> None:
         super().__init__(bodies, 0, bodies.n, context, context.clock.dt)
         self.only: np.ndarray | None = None  # worlds this call acts on, (n_worlds,); None for all
@@ -85,11 +87,24 @@ class WorldView(GroupView):
 
     @property
     def seeds(self) -> np.ndarray:
+        self.context.has_chance = True
         return self.context.seeds
 
     def team_numbers(self, team: np.ndarray) -> np.ndarray:
-        """Index of each team in `teams`: its row in per-team columns."""
-        return np.searchsorted(self.teams, team)
+        """Index of each team in `teams`: its row in per-team columns.
+
+        Raises:
+            ParameterError: The mission has no such team.
+        """
+        number = np.searchsorted(self.teams, team)
+        is_none = np.take(self.teams, number, mode="clip") != team
+        if is_none.any():
+            wrong = np.atleast_1d(team)[np.atleast_1d(is_none)][0]
+            raise ParameterError(f"w.team_numbers: team = {wrong} is not allowed; {self._teams_there()}")
+        return number
+
+    def _teams_there(self) -> str:
+        return f"the mission has teams {', '.join(map(str, self.teams))}"
 
     def rows_at(self, world: np.ndarray, ids: np.ndarray) -> np.ndarray:
         """Row of each (world, id), (m,); -1 for id 0 and for removed entities.
@@ -221,9 +236,7 @@ class WorldView(GroupView):
         except ValueError:
             raise ParameterError(f"w.spawn: {name} has shape {np.shape(value)}; it takes {shape}") from None
         if name == "team" and not np.isin(values, self.teams).all():
-            raise ParameterError(
-                f"w.spawn: team = {value!r} is not allowed; the mission has teams {', '.join(map(str, self.teams))}"
-            )
+            raise ParameterError(f"w.spawn: team = {value!r} is not allowed; {self._teams_there()}")
         return values
 
     def active_worlds(self) -> list[int]:

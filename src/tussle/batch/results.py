@@ -71,8 +71,8 @@ class Results:
         table: One row per run, team and metric.
         alive: Entities of each run and team whenever their number changes.
         runs: One row per finished run: keys, variables, how it ended, and each quantity.
-        n_distinct: Distinct games among the runs that did not fail: where all of a point have one final state and the same results, they
-            are copies of one game.
+        n_distinct: Distinct games among the runs that did not fail: where nothing in those of a point depends on the seed, they are
+            copies of one game.
     """
 
     def __init__(self, stored: StoredBatch) -> None:
@@ -92,7 +92,7 @@ class Results:
         self.n_distinct: int = len(np.unique(self._game[~self._is_failed]))
         if n_copies := self.n_runs - self.n_failed - self.n_distinct:
             self.notes.append(
-                f"{n_copies:,} of {self.n_runs:,} runs are copies of another run of their point: all of a point end in the same state; "
+                f"{n_copies:,} of {self.n_runs:,} runs are copies of another run of their point: nothing in them depends on the seed; "
                 f"intervals count distinct games ({self.n_distinct:,})"
             )
         self._fits: dict[tuple[str, bool], Response] = {}

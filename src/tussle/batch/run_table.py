@@ -9,6 +9,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from tussle.batch.quantities import column_name
+from tussle.batch.schemas import PLAYED_BY_CHANCE
 
 FACTS = ("end", "t", "steps", "winner", "error", "state_hash", "cpu_s", "host")
 """Columns of the results that are the same in all rows of a run, in the order in which the table of runs has them."""
@@ -78,11 +79,11 @@ def with_values(
 
 
 def distinct_games(runs: pa.Table, failed: np.ndarray, quantities: Collection[np.ndarray] = ()) -> np.ndarray:
-    """A number for each run, (n_runs,): one for all runs of a point where they end in the same state with the same results, else its own.
+    """A number for each run, (n_runs,): one for all runs of a point where nothing in them depends on the seed, else its own.
 
-    Then nothing in these games depends on the seed: they are copies of one game. Where only some are alike, they are so by chance, as
-    most games without a rare event are, or games in which nobody is left; each of them is an observation. Where the state is the
-    same, the results may differ: a radio loses other messages, which nobody needs.
+    These are copies of one game: births do not draw, no plugin of the batch does, and all end in the same state with the same results.
+    Games that draw are alike by chance, as those without a rare event are, or those in which nobody is left; each of them is an
+    observation. Games that do not draw may still differ: a plugin may ask the world outside.
 
     Args:
         runs: One row per run.
@@ -90,7 +91,8 @@ def distinct_games(runs: pa.Table, failed: np.ndarray, quantities: Collection[np
         quantities: Each result of the runs, (n_runs,).
     """
     game, point = np.arange(len(failed)), runs["point"].to_numpy()
-    if failed.all():
+    chance = runs["chance"].to_numpy()
+    if failed.all() or (chance == PLAYED_BY_CHANCE).any():
         return game
     text = pc.fill_null(runs["state_hash"].combine_chunks(), "").dictionary_encode()
     hashes = text.indices.to_numpy().astype(np.int64)
@@ -98,7 +100,7 @@ def distinct_games(runs: pa.Table, failed: np.ndarray, quantities: Collection[np
     played = np.flatnonzero(~failed)
     played = played[np.argsort(point[played], kind="stable")]
     first = np.flatnonzero(np.diff(point[played], prepend=-1))  # of each point
-    are_copies = np.logical_and.reduceat(is_known[played], first)
+    are_copies = np.logical_and.reduceat(is_known[played] & (chance[played] == 0), first)
     for bits in (hashes, *(np.asarray(values, np.float64).view(np.int64) for values in quantities)):
         are_copies &= np.minimum.reduceat(bits[played], first) == np.maximum.reduceat(bits[played], first)
     sizes = np.diff(first, append=len(played))

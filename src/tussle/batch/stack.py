@@ -13,6 +13,7 @@ import numpy as np
 from tussle.api import Plugin
 from tussle.batch.consistency import MAX_NAME, bounded
 from tussle.batch.quantities import column_name
+from tussle.batch.schemas import PLAYED_BY_CHANCE
 from tussle.batch.tasks import BatchRun, Finished, Heartbeat, Watcher
 from tussle.declare.columns import Handle
 from tussle.engine.result import WorldResult
@@ -247,8 +248,14 @@ class _Stack:
         return Finished(
             run.number, result.end, result.t, result.steps,
             None if result.error else result.winner, result.state_hash, "" if result.error is None else _reported(result.error),
-            self._cpu.total - float(self._cpu_begun[world]), self._host, metrics_of(result), alive, seen,
+            self._cpu.total - float(self._cpu_begun[world]), self._host, metrics_of(result), alive, seen, self._chance_of(world),
         )  # fmt: skip
+
+    def _chance_of(self, world: int) -> int:
+        """What of a game depends on its seed, as in `Finished`."""
+        assert self.sim is not None
+        state = self.sim.state
+        return PLAYED_BY_CHANCE if state.context.has_chance else int(state.births.are_drawn(world))
 
 
 def _by_path(runs: Sequence[BatchRun]) -> dict[str, list[Any]]:

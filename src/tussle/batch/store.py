@@ -17,7 +17,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from tussle.batch.consistency import check_design, check_metrics, check_results
-from tussle.batch.schemas import BATCH, RULES
+from tussle.batch.schemas import BATCH, PLAYED_BY_CHANCE, RULES
 from tussle.batch.tasks import Finished
 from tussle.documents import is_count, json_text
 from tussle.errors import BatchError, RecordError
@@ -47,6 +47,7 @@ PLAYED = pa.schema(
         ("steps", pa.int32()),
         ("winner", pa.int32()),
         ("state_hash", pa.string()),
+        ("chance", pa.uint8()),
         ("error", pa.string()),
         ("cpu_s", pa.float64()),
         ("host", pa.string()),
@@ -59,7 +60,7 @@ PLAYED = pa.schema(
 IS_OWN = (BATCH_FILE, f"{BATCH_FILE}.part", LOCK)
 """Files that a directory may have before its batch has begun: a batch may have been killed then."""
 
-OF_RUN = ("end", "t", "steps", "winner", "state_hash", "error", "cpu_s", "host")
+OF_RUN = ("end", "t", "steps", "winner", "state_hash", "chance", "error", "cpu_s", "host")
 
 RESULTS = pa.schema(
     [
@@ -132,7 +133,7 @@ def tables(played: pa.Table, design: pa.Table) -> tuple[pa.Table, pa.Table]:
     results = pa.table([columns[c.name].cast(c.type) for c in RESULTS], schema=RESULTS)
     index, found = _exploded(played["alive"])
     alive = {"run": played["run"].combine_chunks().take(index)} | {n: found.field(n) for n in ALIVE.names[1:]}
-    return _ordered(results, ("run", "team", "metric")), pa.table(
+    return _with_one_chance(_ordered(results, ("run", "team", "metric"))), pa.table(
         [alive[c.name].cast(c.type) for c in ALIVE], schema=ALIVE
     )
 
@@ -442,12 +443,21 @@ def merged(path: Path, played: pa.Table, design: pa.Table, notes: list[str]) -> 
     for table in (results, alive):
         check_values(zip(table.column_names, table.columns, strict=True), RULES, path / PARTS, BatchError)
     # Each by its own runs: a batch that was killed at its end may have written one of the two.
-    results = _with_new(old, results, ("run", "team", "metric"))
+    results = _with_one_chance(_with_new(old, results, ("run", "team", "metric")))
     check_metrics(results, path / RESULTS_FILE)
     alive = _with_new(old_alive, alive, ("run", "t", "team"))
     return results, alive.filter(
         pc.is_in(alive["run"], pc.unique(results["run"]).cast(pa.int64()))
     ) if notes else alive
+
+
+def _with_one_chance(results: pa.Table) -> pa.Table:
+    """A table of results in which plugins of all runs draw if those of one do; whose stack that was, depends on how runs are played."""
+    if not pc.any(pc.equal(results["chance"], PLAYED_BY_CHANCE)).as_py():
+        return results
+    column = results.schema.get_field_index("chance")
+    full = np.full(results.num_rows, PLAYED_BY_CHANCE, np.uint8)
+    return results.set_column(column, results.schema.field(column), pa.array(full))
 
 
 def _with_new(old: pa.Table | None, new: pa.Table, order: tuple[str, ...]) -> pa.Table:

@@ -52,6 +52,7 @@ class Finished:
         metrics: (team or None, name, value).
         alive: (team, t [s], entities) for each change of the number, from the start to the end.
         watched: What the package's watcher says of the game; None without one, and for a failed run.
+        chance: What depends on the seed: 0 nothing, 1 the births, `PLAYED_BY_CHANCE` also the rest of some game of its stack.
     """
 
     number: int
@@ -66,6 +67,7 @@ class Finished:
     metrics: list[tuple[int | None, str, float]]
     alive: list[tuple[int, float, int]]
     watched: Any = None
+    chance: int = 0
 
     @staticmethod
     def failed(run: BatchRun, error: str, teams: Iterable[int]) -> Finished:

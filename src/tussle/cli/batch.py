@@ -34,7 +34,7 @@ from tussle.batch.trust import digest
 from tussle.batch.variables import Variable, parse_variable
 from tussle.cli.batch_options import BatchOptions
 from tussle.cli.interrupt import Interrupt, Interrupted
-from tussle.cli.options import ending_by_time, show_notes
+from tussle.cli.options import show_notes
 from tussle.cli.play import check_hash, record, simulate
 from tussle.cli.progress import ProgressMeter, clock, compiling, times
 from tussle.cli.tables import estimate, fact_list, indented, number_tables, title
@@ -137,7 +137,7 @@ def batch_of(options: BatchOptions) -> Batch:
         search=list(map(str, options.data_path)),
     )
     if options.end is not None:
-        ending_by_time(made.mission)
+        made.mission.ending_by_time()
     show_notes(made.loaded)
     return made
 

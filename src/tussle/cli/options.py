@@ -327,7 +327,7 @@ class MissionOptions(PluginOptions):
         if shows_notes:
             show_notes(loaded, shows_viewer_notes)
         seed = self.seed if self.seed is not None else loaded.seed if loaded.seed is not None else 1
-        return loaded, loaded.mission if self.end is None else ending_by_time(loaded.mission), seed
+        return loaded, loaded.mission if self.end is None else loaded.mission.ending_by_time(), seed
 
 
 def show_notes(loaded: Loaded | None, shows_viewer_notes: bool = False) -> None:
@@ -335,16 +335,3 @@ def show_notes(loaded: Loaded | None, shows_viewer_notes: bool = False) -> None:
     if loaded is not None:
         for note in loaded.notes if shows_viewer_notes else loaded.game_notes:
             say_note(note)
-
-
-def ending_by_time(mission: Mission) -> Mission:
-    """Add the end condition "time" to a mission.
-
-    Raises:
-        ParameterError: The end is not after the start.
-    """
-    if not mission.end > mission.start:
-        raise ParameterError(
-            f"--end {mission.end:g} is not allowed; it takes a time in s > {mission.start:g}, the start"
-        )
-    return mission.ending_by_time()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
@@ -12,8 +12,10 @@ from tussle.api.kinds import row_shape
 from tussle.api.plugin import Plugin
 from tussle.declare.columns import Numbers, Param, State
 from tussle.engine.group import Binding, Group
+from tussle.engine.params import item_of
 from tussle.engine.state import SimulationState
 from tussle.engine.table import Stored, Table
+from tussle.engine.world_bindings import WorldBinding
 from tussle.errors import ParameterError, listed
 from tussle.mission import Block, paths
 
@@ -57,7 +59,16 @@ def _located(state: SimulationState, path: str) -> tuple[Any, tuple[str, ...], s
     Returns:
         The block or world plugin, the plugin path in the block, the column's name, its declaration, and the shape of one row's value.
     """
-    owners, name = paths.resolve(path, paths.MissionRoot(state.mission), paths.inside, _columns)
+    root = paths.MissionRoot(state.mission)
+    try:
+        owners, name = paths.resolve(path, root, paths.inside, _columns)
+    except ParameterError:
+        owners, name = paths.resolve(path, root, paths.inside, lambda owner: None)
+        if name in paths.settable(owners[-1] if owners else root):
+            raise ParameterError(
+                f"{path!r} is fixed once the simulation is built: it is no column that can be read or written; set it in the mission"
+            ) from None
+        raise
     owner, column = owners[-1], _columns(owners[-1])[name]
     shape = column.shape if isinstance(owner, Block) or column.ragged else row_shape(owner, column)
     return owners[0], tuple(p.instance_name for p in owners[1:]), name, column, shape
@@ -114,9 +125,13 @@ def read(state: SimulationState, path: str) -> tuple[np.ndarray, np.ndarray]:
     return out, alive
 
 
-def _world_column(state: SimulationState, path: str, name: str) -> np.ndarray:
+def _world_binding(state: SimulationState, path: str) -> WorldBinding:
     head = path.partition(".")[0]
-    world_binding = next(r for r in state.world_bindings if r.spec.instance_name == head)
+    return next(r for r in state.world_bindings if r.spec.instance_name == head)
+
+
+def _world_column(state: SimulationState, path: str, name: str) -> np.ndarray:
+    world_binding = _world_binding(state, path)
     if name not in world_binding.places:
         raise ParameterError(f"{path!r} is the same in all worlds; it is not a column")
     per, place = world_binding.places[name]
@@ -151,6 +166,9 @@ def write(state: SimulationState, path: str, values: Any, world: int | None = No
         target = np.moveaxis(array, -1, 0)[some]
         new_values = _shaped(path, values, target.shape)
         _check_written(path, np.moveaxis(new_values, 0, -1), column)
+        _check_together(
+            path, head, np.moveaxis(new_values, 0, -1), lambda k: _world_column(state, path, k)[..., some]
+        )
         target[:] = new_values
         state.world_view.renew()  # it keeps values of parameters
         return new_values
@@ -186,6 +204,8 @@ def write(state: SimulationState, path: str, values: Any, world: int | None = No
                 group.motion_view.begin(group.motion.plugin)
                 group.motion.plugin.from_body(group.motion_view, mine[differs])
         else:
+            table, places = group.table, binding.places
+            _check_together(path, binding.spec, part, lambda k: table.array(places[k])[..., mine])  # noqa: B023 - called at once
             target[..., mine] = part
             for view in group.views:  # views cache the reaches of parameters until the next repack
                 view.reset(bodies, group.first, group.last)
@@ -230,3 +250,18 @@ def _check_written(path: str, values: np.ndarray, column: Numbers, is_body: bool
         different = np.unique(values, axis=-1).T if column.fields else np.unique(values)
         for value in different.tolist():
             column.convert(value, path)
+
+
+def _check_together(path: str, plugin: Plugin, new: np.ndarray, stored: Callable[[str], np.ndarray]) -> None:
+    """Check a parameter that is being written, (..., n), with those that its plugin compares it with, such as lower and upper limits."""
+    written, params = path.rpartition(".")[2], plugin.params()
+    names = [k for k, p in params.items() if not (p.structural or p.ragged or p.is_text)]
+    if type(plugin).check_values is Plugin.check_values or written not in names:
+        return
+    values = {k: new if k == written else stored(k) for k in names}
+    every = np.concatenate([np.atleast_2d(each).astype(float) for each in values.values()])
+    for i in np.unique(every, axis=1, return_index=True)[1]:
+        try:
+            plugin.check_values_with({k: item_of(each[..., i]) for k, each in values.items()})
+        except ParameterError as error:
+            raise ParameterError(f"{path!r}: {error}") from None

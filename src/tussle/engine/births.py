@@ -181,6 +181,19 @@ class Births:
         """Return True if the blocks have no future births in a world."""
         return not (self.n_left[:, world] > 0).any()
 
+    def are_drawn(self, world: int) -> bool:
+        """Return True if places, headings or times of a world's entities so far depend on its seed."""
+        for block, n_born in zip(self.overrides.mission.blocks, self.n_born[:, world].tolist(), strict=True):
+            scatter = "half_width" if block.placement == "uniform" else "variance"
+            place, heading = (
+                self.overrides.block_values(block, (name,), np.array([world])).any()
+                for name in (scatter, "heading_variance")
+            )
+            is_late = block.rate and block.interval_sd
+            if n_born and (heading or is_late or (place and (n_born > 1 or block.scatter_first))):
+                return True
+        return False
+
     def create(
         self,
         new: Bodies,

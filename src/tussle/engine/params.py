@@ -99,7 +99,7 @@ class Overrides:
             kept = [key for key in self.columns if key[:2] == place]
             seen: set[tuple[Any, ...]] = set()
             for i, world in enumerate(worlds.tolist()):
-                values = {key[2]: _item(self.columns[key][world]) for key in kept if self.given[key][world]}
+                values = {key[2]: item_of(self.columns[key][world]) for key in kept if self.given[key][world]}
                 values |= {key[2]: items[i] for key, _, _, items in found if key[:2] == place}
                 if (one := tuple(values.items())) not in seen:
                     seen.add(one)
@@ -157,7 +157,7 @@ class Overrides:
         return self._variants[key]
 
 
-def _item(value: Any) -> Any:
+def item_of(value: Any) -> Any:
     """A value of a column as plugins keep it."""
     item = value.tolist()
     return tuple(item) if isinstance(item, list) else item

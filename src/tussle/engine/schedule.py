@@ -86,6 +86,7 @@ def compose(state: SimulationState) -> list[Call]:
 def _take_turns(state: SimulationState, turns: list[tuple[Group, list[Call]]]) -> None:
     """Let the entities of the only world decide and move in an order that is drawn by its seed and step."""
     places = np.array([group.place for group, _ in turns], np.int64)
+    state.context.has_chance = True
     chance = rng.uniform(state.context.keys[:1], ORDER, places, state.context.clock.step[:1])[0]
     in_blocks = state.mission.update == "random_in_blocks"
     names = state.context.block_names

@@ -68,6 +68,14 @@ def _declared(kind: type, **columns: Any) -> dict[str, Param]:
     return declared
 
 
+def too_early(start: float, end: float, dt: float) -> str:
+    """What is wrong with an end time [s] before which no step would be played; "" for others."""
+    if (end - start) / dt > 0.5:
+        return ""
+    least = start + 0.5 * dt
+    return f"end = {end:g} s is not allowed; with start = {start:g} s and dt = {dt:g} s it takes a time > {least:g} s"
+
+
 def end_conditions(value: Any, where: str) -> tuple[str, ...]:
     """Parse end conditions from a list or a text; duplicates are dropped.
 
@@ -356,6 +364,8 @@ class Mission:
             )
         _set(self, "rekeys", checked_rekeys(self.rekeys))
         _set(self, "end_conditions", end_conditions(self.end_conditions, "mission: end_conditions"))
+        if "time" in self.end_conditions and (problem := too_early(self.start, self.end, self.dt)):
+            raise MissionError(f"mission: {problem}")
         for name, kind in (("interactions", Interaction), ("metrics", Metric), ("networks", Network)):
             _set(self, name, _plugins(f"mission: {name}", getattr(self, name), kind))
         given = [p.instance_name for p in self.networks]

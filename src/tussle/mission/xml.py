@@ -27,7 +27,7 @@ from tussle.mission.problems import Place, Problems
 from tussle.mission.rekeys import parse_rekeys
 from tussle.mission.scene_tags import SCENE_TAGS, SceneReader
 from tussle.mission.source import MissionSource, SourceReader, find_mission
-from tussle.mission.spec import MISSION_VALUES, Mission, end_conditions, read_from_file
+from tussle.mission.spec import MISSION_VALUES, Mission, end_conditions, read_from_file, too_early
 from tussle.mission.stray_tags import report_stray
 from tussle.mission.strictness import strictness_of
 from tussle.mission.tags import RUN, RUNSCRIPT, SEED_ATTRIBUTES, WORLD, TagSpec
@@ -240,9 +240,8 @@ class _WorldReader:
         if plugins.has_found:
             self.source.text = root.to_text()
         conditions, seed, reseed = self._end_conditions(), self._seed(), self._reseed()
-        if "time" in conditions and not times["end"] > times["start"]:
-            text = f"end {times['end']:g} s is not after start {times['start']:g} s: the game ends in its first step"
-            problems.note((self._last("run") or self.root).where("end"), text)
+        if "time" in conditions and (text := too_early(times["start"], times["end"], times["dt"])):
+            problems.error((self._last("run") or self.root).where("end"), text)
         parts = scene.parts()
         self._settings()
         self.viewer.pop("map", None)

@@ -14,7 +14,7 @@ from gymnasium import spaces
 
 from tussle.arguments import check_fields, check_kind, kinds_of
 from tussle.documents import Whole, check_argument
-from tussle.errors import ParameterError, listed, nearest_name
+from tussle.errors import DeclarationError, ParameterError, listed, nearest_name, slip_of
 from tussle.mission import Block, Mission, mission_of
 from tussle.rl.action import Act, Decoder, learned
 from tussle.rl.computed import Computed
@@ -55,6 +55,7 @@ class Task:
 
     Raises:
         ParameterError: An attribute is unknown, or a value is not allowed.
+        DeclarationError: A subclass has a name that differs by a letter from one of these, of `ends` or of `action_mask`.
     """
 
     mission: ClassVar[Any] = None
@@ -76,8 +77,16 @@ class Task:
     margin: str = ""
     _stands_alone: ClassVar[bool] = True  # a file of --plugin-path may define tasks only
 
+    def __init_subclass__(cls, **kwargs: Any) -> None:
+        super().__init_subclass__(**kwargs)
+        for name in vars(cls):
+            if meant := slip_of(name, (*_attributes(), "ends", "action_mask")):
+                raise DeclarationError(
+                    f"{cls.__name__}.{name} is nothing that a task has, and is never used (did you mean {meant!r}?)"
+                )
+
     def __init__(self, **values: Any) -> None:
-        known = [k for k in Task.__annotations__ if not k.startswith("_")]
+        known = _attributes()
         for name, value in values.items():
             if name not in known:
                 raise ParameterError(
@@ -355,6 +364,11 @@ class Task:
     def action_space(self, agent: int) -> spaces.Space[Any]:
         """Actions of an agent; a space of its own, as each has a random generator."""
         return copy.deepcopy(self.decoders[self.agent_block[agent]].space)
+
+
+def _attributes() -> list[str]:
+    """Names of the attributes of a task."""
+    return [name for name in Task.__annotations__ if not name.startswith("_")]
 
 
 def _made(kind: type[Task], values: dict[str, Any]) -> Task:

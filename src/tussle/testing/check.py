@@ -56,6 +56,7 @@ def check_plugin(cls: type[Plugin], *, companions: Sequence[Any] | None = None, 
         try:
             _play(variant, companions or (), is_first=number == 0)
         except ConformanceError as error:
+            check_class_values(cls, before)  # it names the cause
             if number and repr(variant) not in error.evidence:
                 text = f"as {variant!r}, {error.evidence}"
                 raise ConformanceError(error.plugin, error.rule, text) from error

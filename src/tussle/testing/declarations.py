@@ -15,7 +15,7 @@ from tussle.api.motion import WRITABLE
 from tussle.declare import units
 from tussle.declare.columns import Column, Input, Numbers, Output, Param, State
 from tussle.engine.wiring import BELIEF
-from tussle.errors import ConformanceError, TussleError, listed
+from tussle.errors import ConformanceError, TussleError, listed, slip_of
 
 RULE = "declarations"
 HOOKS_NAMES = """
@@ -85,16 +85,23 @@ def _attributes(cls: type[Plugin]) -> Iterator[str]:
 
 
 def _method(cls: type[Plugin], name: str, value: Any) -> Iterator[str]:
-    """Finds methods that remember in a default, and those whose name has the letters of a hook in another order, which are not called."""
+    """Finds methods that remember in a default, and those whose name is nearly that of a hook, which are not called."""
     function = getattr(value, "__func__", value)
     if not isinstance(function, FunctionType):
         return
     for default in (*(function.__defaults__ or ()), *(function.__kwdefaults__ or {}).values()):
         if isinstance(default, MUTABLE):
             yield f"an argument of {name} has a {type(default).__name__} as its default, which all calls share; declare a column"
-    hook = next((k for k in HOOKS & set(dir(cls)) if k != name and sorted(k) == sorted(name)), None)
-    if hook is not None and name not in HOOKS:
+    hook = slip_of(name, sorted(HOOKS & set(dir(cls))))
+    if hook is not None and name not in (*HOOKS, *cls.services, *_called(cls)):
         yield f"{name} is not a hook, and never called (did you mean {hook!r}?)"
+
+
+def _called(cls: type[Plugin]) -> Iterator[str]:
+    """Names that the methods of a class use."""
+    for base in own_classes(cls):
+        for value in vars(base).values():
+            yield from getattr(getattr(value, "__code__", None), "co_names", ())
 
 
 def _hooks(cls: type[Plugin]) -> Iterator[str]:

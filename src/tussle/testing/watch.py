@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import inspect
+import pickle
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from functools import partial
 from typing import Any
 
@@ -11,6 +13,7 @@ import numpy as np
 
 from tussle.api import GroupView, Interaction, MotionModel, Plugin, WorldView
 from tussle.api.pairs import Pairs
+from tussle.declare.columns import Column
 from tussle.engine.group import Binding, Group
 from tussle.engine.simulation import Simulation
 from tussle.engine.world_bindings import WorldBinding
@@ -63,24 +66,37 @@ def check_calls(game: ConformanceGame) -> None:
                 raise ConformanceError(cls.__name__, MEMORY, text)
 
 
-def class_values(cls: type[Plugin]) -> dict[str, Any]:
-    """Attributes of the class and its own bases."""
+def class_values(cls: type[Plugin]) -> dict[str, tuple[Any, bytes]]:
+    """Attributes of the class and its own bases, each with its contents."""
     return {
-        f"{base.__name__}.{k}": v
+        f"{base.__name__}.{k}": (v, _contents(v))
         for base in own_classes(cls)
         for k, v in vars(base).items()
         if k not in MACHINERY and not k.startswith("__")
     }
 
 
-def check_class_values(cls: type[Plugin], before: dict[str, Any]) -> None:
-    """No attribute of the class changed during a game.
+def _contents(value: Any) -> bytes:
+    """What an attribute holds, such as the items of a queue or the attributes of an object; empty where that cannot be told."""
+    for held in (value, getattr(value, "__dict__", None)):
+        if not isinstance(held, type | Column):
+            with suppress(Exception):  # what cannot be pickled raises anything
+                return pickle.dumps((held, getattr(held, "__dict__", None)))
+    return b""
+
+
+def check_class_values(cls: type[Plugin], before: dict[str, tuple[Any, bytes]]) -> None:
+    """No attribute of the class changed during a game, nor what it holds.
 
     Raises:
         ConformanceError: An attribute changed.
     """
     after = class_values(cls)
-    changed = [k for k in after if k not in before or after[k] is not before[k]]
+    changed = [
+        k
+        for k, (value, held) in after.items()
+        if k not in before or value is not before[k][0] or held != before[k][1]
+    ]
     if changed:
         text = f"{changed[0]} changed during a game; all simulations share the class, so declare a State"
         raise ConformanceError(cls.__name__, MEMORY, text)

@@ -28,9 +28,11 @@ class Bowl(Metric):
 
     def result(self, w):
         height = TOP - (self.x - BEST_X) ** 2 - (self.y - BEST_Y) ** 2
-        own = (w.seeds * np.uint64(7919) % np.uint64(11)).astype(float) / 10.0 - 0.5
-        # The usual noise of shaders: neighbours in x have nothing to do with each other.
-        mixed = np.mod(np.sin(12.9898 * w.seeds.astype(float) + 78233.0 * self.x) * 43758.5453, 1.0) - 0.5
+        own = mixed = 0.0
+        if self.luck.any() or self.rough.any():
+            own = (w.seeds * np.uint64(7919) % np.uint64(11)).astype(float) / 10.0 - 0.5
+            # The usual noise of shaders: neighbours in x have nothing to do with each other.
+            mixed = np.mod(np.sin(12.9898 * w.seeds.astype(float) + 78233.0 * self.x) * 43758.5453, 1.0) - 0.5
         return {
             "height": height + self.luck * own + self.rough * mixed,
             "log": np.where(self.x < 0.0, np.nan, self.x),

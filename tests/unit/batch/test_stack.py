@@ -165,7 +165,7 @@ def test_what_raises_costs_its_stack_and_what_belongs_to_a_run_costs_nobody(monk
 
 
 def test_a_game_that_is_over_at_once_is_kept():
-    run = finished(game(end=0.0), n=1)[0]
+    run = finished(game(end=0.1), n=1)[0]
     assert run[:3] == ("time", 0.1, 1)
     nobody = Mission(
         blocks=[Block(name="b", count=0, motion=Still())], end=0.2, end_conditions="all_dead, time"

@@ -414,6 +414,23 @@ def test_a_world_plugin_moves_by_w_move_only():
         Simulation(mission(interactions=[Pusher()])).step()
 
 
+def test_a_name_that_is_not_there_is_of_what_the_author_calls_the_view_so_and_methods_are_near_too():
+    class Judge(Interaction):
+        def step(self, w):
+            w.killl([0], "all")
+
+    with pytest.raises(PluginError, match=r"w has no 'killl' \(did you mean 'kill'\?\)"):
+        Simulation(mission(interactions=[Judge()])).step()
+    assert "g has no 'uniforn' (did you mean 'uniform'?)" in failing(lambda self, g: g.uniforn("a"))
+
+    class Slow(FaultyMotion):
+        def to_body(self, body):
+            body.poss[:] = 0.0
+
+    with pytest.raises(PluginError, match=r"body has no 'poss' \(did you mean 'pos'\?\)"):
+        Simulation(mission(block(motion=Slow()))).step()
+
+
 def test_entities_do_not_kill():
     assert "g has no 'kill'" in failing(lambda self, g: g.kill([0], "me"))
 

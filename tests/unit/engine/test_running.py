@@ -461,6 +461,55 @@ def test_parameters_with_several_fields_are_checked_when_written():
         sim.write("a.Bounded.box", [[(1.0, -2.0)]])
 
 
+class Limits:
+    low = Param(0.0, ge=-9.0)
+    high = Param(1.0)
+    size = Param(3, structural=True)
+    name_ = Param("a", choices=("a", "b"))
+    seen = State("x y")
+
+    def check_values(self):
+        self.check_order("low", "high")
+
+
+class LimitsOfAll(Limits, Interaction):
+    pass
+
+
+class LimitsOfEach(Limits, Autonomy):
+    def step(self, g):
+        pass
+
+
+@pytest.mark.parametrize(("owner", "shape"), [("LimitsOfAll", (2,)), ("a.LimitsOfEach", (2, 2))])
+def test_values_that_plugins_compare_are_compared_when_one_is_written(owner, shape):
+    game = mission(block(count=2, autonomy=[Drift(), LimitsOfEach()]), interactions=[LimitsOfAll()])
+    sim = Simulation(game, [1, 2])
+    sim.write(f"{owner}.high", 5.0)
+    sim.write(f"{owner}.low", 3.0)
+    one = np.full(shape, 3.0)
+    one[-1] = 5.5
+    for values in (6.0, one):
+        text = rf"'{owner}.low': Limits\w+.low = \S+ with high = 5.0 is not allowed; low must not be larger than high"
+        with pytest.raises(ParameterError, match=text):
+            sim.write(f"{owner}.low", values)
+    with pytest.raises(ParameterError, match=r"low = 3.0 with high = 2.0"):
+        sim.write(f"{owner}.high", 2.0)
+    np.testing.assert_array_equal(sim.read(f"{owner}.low")[0], np.full(shape, 3.0))
+
+
+@pytest.mark.parametrize(
+    "path", ["LimitsOfAll.size", "a.LimitsOfEach.size", "a.count", "a.heading", "run.dt"]
+)
+def test_what_is_fixed_in_a_simulation_is_told_from_what_does_not_exist(path):
+    sim = Simulation(mission(block(autonomy=[Drift(), LimitsOfEach()]), interactions=[LimitsOfAll()]))
+    for use in (sim.read, lambda path: sim.write(path, 1)):
+        with pytest.raises(ParameterError, match=rf"'{path}' is fixed once the simulation is built"):
+            use(path)
+    with pytest.raises(ParameterError, match=r"has no 'siz'"):
+        sim.write("a.LimitsOfEach.siz", 1)
+
+
 # -- parameters per world -------------------------------------------------------------------------------------------------------
 
 

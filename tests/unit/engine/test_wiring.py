@@ -520,6 +520,22 @@ def test_columns_of_teams_and_worlds_for_world_plugins():
     assert sim.read("Score.points")[0].tolist() == [[0, 0], [10, 20]]
 
 
+@pytest.mark.parametrize("wrong", [0, 4, 8, -1, np.array([3, 5, 7]), np.array([2**40])])
+def test_rows_of_teams_that_the_mission_does_not_have_are_refused(wrong):
+    class Asks(Metric):
+        def step(self, w):
+            assert w.team_numbers(7) == 1
+            assert w.team_numbers([7, 3, 7]).tolist() == [1, 0, 1]
+            assert w.team_numbers(w.team[:0]).tolist() == []
+            w.team_numbers(wrong)
+
+    sim = Simulation(mission(block("a", team=7), block("b", team=3), metrics=[Asks()]))
+    with pytest.raises(
+        PluginError, match=r"w.team_numbers: team = \S+ is not allowed; the mission has teams 3, 7"
+    ):
+        sim.run()
+
+
 @pytest.mark.parametrize(
     ("name", "value", "text"),
     [

@@ -70,7 +70,7 @@ def test_the_networks_to_everyone_and_within_an_entity_are_always_there_once():
 
 @pytest.mark.parametrize(("end", "steps"), [(1.0, 10), (1.04, 10), (1.06, 11), (0.0, 0), (-1.0, 0)])
 def test_steps_until_the_end(end, steps):
-    assert mission(block(), end=end).steps == steps
+    assert mission(block(), end=end, end_conditions="none").steps == steps
 
 
 @pytest.mark.parametrize(

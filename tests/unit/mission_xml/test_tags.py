@@ -11,6 +11,7 @@ from tussle import Simulation
 from tussle.errors import MissionError
 from tussle.mission import read_mission, to_python, to_xml
 from tussle.mission.node import Node
+from tussle.mission.paths import with_value
 from tussle.mission.problems import Place, Problems
 from tussle.mission.stray_tags import report_stray
 from tussle.mission.tags import WORLD, WORLD_MANY
@@ -85,9 +86,6 @@ def test_an_end_between_two_steps_is_noted(files):
 @pytest.mark.parametrize(
     ("tags", "inside", "note"),
     [
-        ('<run start="5" end="2"/>', "", "end 2 s is not after start 5 s"),
-        ('<run start="2" end="2"/>', "", "end 2 s is not after start 2 s"),
-        ('<run start="2" end="2"/><end_condition>one_team</end_condition>', "", None),
         ("<latitude_origin>35</latitude_origin>", "", "<longitude_origin> is missing, and is taken to be -95"),
         ("<longitude_origin>35</longitude_origin>", "", "<latitude_origin> is missing, and is taken to be 29"),
         ("", "<latitude>1</latitude><longitude>2</longitude><altitude>3</altitude>", "count from 29 N, 95 W"),
@@ -98,7 +96,25 @@ def test_an_end_between_two_steps_is_noted(files):
 def test_a_game_that_is_not_where_or_when_it_seems_is_noted(files, tags, inside, note):
     notes = files.world(tags, inside).notes
     assert bool(note) == any((note or "N, 95 W") in each for each in notes)
-    assert note or not any("is not after" in each or "is missing" in each for each in notes)
+    assert note or not any("is missing" in each for each in notes)
+
+
+@pytest.mark.parametrize(
+    ("start", "end", "dt"),
+    [(0, 0, 0.1), (5, 2, 0.1), (2, 2.04, 0.1), (-3, -4, 0.5), (0, 0.05, 0.1), (0, 2, 4)],
+)
+def test_an_end_before_which_no_step_is_played_is_refused_wherever_it_is_given(files, start, end, dt):
+    text = rf"end = {end:g} s is not allowed; with start = {start:g} s and dt = {dt:g} s it takes a time > {start + dt / 2:g} s"
+    with pytest.raises(MissionError, match=rf"m.xml:\d+: {text}"):
+        files.world(f'<run start="{start}" end="{end}" dt="{dt}"/>')
+    endless = files.world(
+        f'<run start="{start}" end="{end}" dt="{dt}"/><end_condition>one_team</end_condition>'
+    )
+    for change in (endless.mission.ending_by_time, lambda: endless.mission.replace(end_conditions="time")):
+        with pytest.raises(MissionError, match=f"^mission: {text}"):
+            change()
+    with pytest.raises(MissionError, match=text):
+        with_value(endless.mission.replace(end=start + dt).ending_by_time(), "run.end", end)
 
 
 def test_end_conditions_are_words_of_a_list(files):

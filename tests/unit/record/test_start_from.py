@@ -6,6 +6,7 @@ import pytest
 from recorded_games import hunt, record
 
 from tussle import Block, Mission, Recorder, Simulation, load_run, read_table
+from tussle.engine.snapshot import hashed
 from tussle.errors import MissionError, ParameterError, RecordError
 from tussle.record import FirstStates
 from tussle.stock import Boids, Unicycle
@@ -48,6 +49,28 @@ def test_a_recorded_game_can_be_played_again(run, tmp_path, world):
         )
         assert one.equals(two)
     assert (again.events["kind"] == "birth").sum() == 2 * 18
+
+
+@pytest.mark.parametrize("has_rate", [True, False])
+def test_only_the_births_to_come_tell_a_game_from_the_one_that_it_starts_from(tmp_path, has_rate):
+    mission = hunt(end=2.0)
+    if not has_rate:
+        mission = mission.replace(blocks=[b.replace(rate=None) for b in mission.blocks])
+    sims = [Simulation(mission, 3)]
+    sims.append(Simulation(mission, 3, start_from=read_table(record(mission, tmp_path / "run", (3,)))))
+    for _ in range(mission.steps - 1):
+        own, again = (list(hashed(sim.state, 0)) for sim in sims)
+        differing = {
+            name
+            for (name, a), (_, b) in zip(own, again, strict=True)
+            if not np.array_equal(a, b, equal_nan=True)
+        }
+        assert differing == ({"births"} if has_rate else set())
+        for sim in sims:
+            sim.step()
+    for sim in sims:
+        sim.run()
+    assert (sims[0].state_hash() == sims[1].state_hash()) is not has_rate
 
 
 def test_entities_enter_with_id_time_and_state(run, tmp_path):

@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 
 from tussle import rl
-from tussle.rl import evaluate
+from tussle.errors import DeclarationError
+from tussle.rl import Task, evaluate
 
 TASKS = ("Battle", "CaptureTheFlag", "Coverage", "FindWay", "Formation", "Hover", "Intercept", "ReachPoint")
 N = 8
@@ -57,3 +58,22 @@ def test_coverage_counts_what_linked_robots_see():
     offset = np.arange(-95.0, 100.0, 10.0)
     seen = ((offset[:, None] - 50.0) ** 2 + offset[None] ** 2 < 625.0).sum()
     assert swarm.terms["covered"][0, 0] == pytest.approx(0.01 * seen / 400.0)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "meant"),
+    [
+        ("reword", lambda self, now: 1.0, "reward"),
+        ("rewards", {}, "reward"),
+        ("lerners", "prey", "learners"),
+        ("end", lambda self, now: False, "ends"),
+        ("action_maks", lambda self, now: None, "action_mask"),
+        ("time_limt", 3.0, "time_limit"),
+    ],
+)
+def test_what_a_task_would_never_use_is_refused_with_what_was_meant(name, value, meant):
+    with pytest.raises(
+        DeclarationError, match=rf"Own.{name} is nothing that a task has.*did you mean '{meant}'"
+    ):
+        type("Own", (Task,), {name: value})
+    type("Own", (Task,), {meant: value, "bonus": 3.0, "reward_of": None, "_rewards": ()})

@@ -302,6 +302,20 @@ def test_recorded_curves_are_the_entities_of_each_frame_and_the_events_so_far(ru
         assert (np.diff(values) != 0).all()
 
 
+@pytest.mark.parametrize("period", [0.7, 5.0, 100.0])
+@pytest.mark.parametrize("mission", [guarded_gate(), hunt(n_prey=8, end=15.0)])
+def test_recorded_curves_of_who_is_left_do_not_depend_on_the_period(tmp_path, mission, period):
+    seldom = Recording(record(mission, tmp_path / "seldom", (5,), period=period))
+    often = Recording(record(mission, tmp_path / "often", (5,)))
+    curves = changes_in(RecordedData(seldom, is_file=False))
+    assert seldom.n_frames < often.n_frames
+    for i in range(often.n_frames):
+        frame = often.frame(i)
+        for team in often.teams:
+            assert value_at(curves["left", team, 0], frame.t + 1e-6) == (frame.team == team).sum()
+    assert len(curves["left", 1, 0][0]) > 2
+
+
 def test_recorded_results_are_those_after_each_step_of_every_world(tmp_path):
     seeds, mission = (5, 6), guarded_gate()
     record(mission, tmp_path / "run", seeds, results=True, period=3.0)

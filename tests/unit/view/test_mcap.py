@@ -286,7 +286,7 @@ def test_models_are_as_large_as_can_be_seen(hunted, tmp_path):
 
 
 def test_a_clock_before_zero_is_shifted_and_that_is_said(tmp_path):
-    recording = Recording(record(hunt(n_prey=2, end=-1.0, start=-2.5), tmp_path / "run", (5,)))
+    recording = Recording(record(hunt(n_prey=2).replace(end=-1.0, start=-2.5), tmp_path / "run", (5,)))
     report = write_mcap(recording, tmp_path / "a.mcap")
     assert report.notes == [
         "t = 0 is 3 s after the beginning of the file's clock, which knows no earlier times"

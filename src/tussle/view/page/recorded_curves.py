@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 
 from tussle.api.bodies import derived_from
+from tussle.view.left import numbers_left
 from tussle.view.recording import QUAT, VEL, Recording
 from tussle.view.series import Changes, CurveName
 
@@ -20,7 +21,7 @@ MAX_POINTS = 20_000
 
 
 def run_changes(run: Recording, team_shift: int = 0, id_shift: int = 0) -> list[Changes]:
-    """Return the entities left in each team, from the frames; those born and the captures made, from the events; results; robustness.
+    """Return the entities left in each team, from frames and events; those born and the captures made, from events; results; robustness.
 
     Args:
         run: The run.
@@ -32,10 +33,15 @@ def run_changes(run: Recording, team_shift: int = 0, id_shift: int = 0) -> list[
         for event in run.events
         if event.kind == "birth" and event.text in run.blocks
     }
-    changes = [*_left(run)]
-    for team in run.teams:
-        born = [e.t for e in run.events if e.kind == "birth" and team_of.get(e.id) == team]
-        changes.append(_counted(CurveName("born", team), float(run.t[0]), born))
+    born, died = (
+        {
+            team: [e.t for e in run.events if e.kind == kind and team_of.get(e.id) == team]
+            for team in run.teams
+        }
+        for kind in ("birth", "death")
+    )
+    changes = [*_left(run, born, died)]
+    changes += [_counted(CurveName("born", team), float(run.t[0]), t) for team, t in born.items()]
     by_team = {
         team: [e.t for e in run.events if e.kind == "capture" and team_of.get(e.id) == team]
         for team in run.teams
@@ -54,8 +60,10 @@ def _shifted(changes: Changes, team_shift: int, id_shift: int) -> Changes:
     return Changes(q, 0, changes.t, changes.values)
 
 
-def _left(run: Recording) -> Iterable[Changes]:
-    """Entities of each team, counted in the frames in which their number may have changed."""
+def _left(
+    run: Recording, born: Mapping[int, list[float]], died: Mapping[int, list[float]]
+) -> Iterable[Changes]:
+    """Entities of each team: in the frames in which their number may have changed, and after births and deaths [s] between them."""
     is_changed = np.diff(run.counts, prepend=-1) != 0
     times = [e.t for e in run.events if e.kind in ("birth", "death")]
     for side in ("left", "right"):
@@ -63,9 +71,10 @@ def _left(run: Recording) -> Iterable[Changes]:
         is_changed[places[places < run.n_frames]] = True
     frames = np.flatnonzero(is_changed)
     counts = np.array([[(run.team_column(int(i)) == team).sum() for team in run.teams] for i in frames])
-    for team, n in zip(run.teams, counts.T, strict=True):
+    for team, seen in zip(run.teams, counts.T, strict=True):
+        t, n = numbers_left(run, run.t[frames], seen, born[team], died[team])
         is_new = np.diff(n, prepend=-1) != 0
-        yield Changes(CurveName("left", team), 0, run.t[frames[is_new]].tolist(), n[is_new].tolist())
+        yield Changes(CurveName("left", team), 0, t[is_new].tolist(), n[is_new].tolist())
 
 
 def _counted(quantity: CurveName, start: float, times: list[float]) -> Changes:

@@ -9,6 +9,7 @@ import numpy as np
 from tussle.batch.report.drawing import rule_y
 from tussle.errors import ParameterError
 from tussle.palette import INK, MUTED
+from tussle.view.left import numbers_left
 from tussle.view.plots.selection import Trajectories
 from tussle.view.plots.sheet import Handle, add_head, line_look, line_sign, mark_sign, sheet, time_axis
 
@@ -42,33 +43,12 @@ def left(tracks: Trajectories) -> Figure:
 
 
 def _number_left(tracks: Trajectories, team: int) -> tuple[np.ndarray, np.ndarray]:
-    """Entities of a team over time: in each frame, and after each birth and death between frames that lie apart.
-
-    Returns:
-        Times [s], and how many there are from then on, (k,) each.
-    """
-    recording = tracks.recording
+    """Times [s], and how many entities of a team there are from then on, (k,) each."""
     is_mine = np.repeat(tracks.team == team, np.diff(tracks.first))
     n = np.bincount(tracks.frame[is_mine], minlength=len(tracks.frame_times))
-    steps = np.rint((tracks.frame_times - recording.start) / recording.dt).astype(np.int64)
     mine = [h for h in tracks.events if tracks.team_of.get(h.id) == team and _is_chosen(tracks, h.id)]
-    born, died = (
-        np.rint((np.array([h.t for h in mine if h.kind == kind]) - recording.start) / recording.dt).astype(
-            np.int64
-        )
-        for kind in ("birth", "death")
-    )
-    born, gone = np.sort(born), np.sort(died + 1)  # who dies is there until the step ends
-    between = np.setdiff1d(np.append(born, gone), steps)
-    between = between[(between > steps[0]) & (between < steps[-1])]
-    frame = np.searchsorted(steps, between) - 1
-
-    def change(at: np.ndarray) -> np.ndarray:
-        return np.searchsorted(born, at, "right") - np.searchsorted(gone, at, "right")
-
-    t = np.append(tracks.frame_times, recording.start + between * recording.dt)
-    order = np.argsort(t, kind="stable")
-    return t[order], np.append(n, n[frame] + change(between) - change(steps[frame]))[order]
+    born, died = ([h.t for h in mine if h.kind == kind] for kind in ("birth", "death"))
+    return numbers_left(tracks.recording, tracks.frame_times, n, born, died)
 
 
 def captures(tracks: Trajectories) -> Figure:
