@@ -17,6 +17,7 @@ from tussle.api.range_kernel import RangeKernel
 from tussle.api.row_laws import BODY_INPUTS, advance_rows
 from tussle.declare.columns import Channel, Param, State
 from tussle.errors import DeclarationError, ParameterError, listed, nearest_name
+from tussle.numeric.arrays import numbers_of
 from tussle.numeric.paths import GRAVITY
 from tussle.numeric.quaternion import quat_from_euler
 from tussle.numeric.rk4 import compile_derivative, rk4
@@ -247,10 +248,11 @@ class MotionModel(EntityPlugin):
                 f"{type(self).__name__} has no rollout: its dynamics are in {', '.join(self.handles())}"
             )
         own = self.__dict__["_values"]
-        x = np.array(x0, float)
+        where = f"{type(self).__name__}.rollout"
+        x = numbers_of(x0, f"{where}: x0").copy()
         is_single = x.ndim == 1
         x = np.ascontiguousarray(x[:, None] if is_single else x)
-        u = np.asarray(inputs, float)
+        u = numbers_of(inputs, f"{where}: inputs")
         u = u[..., None] if u.ndim == 2 else u
         n, names = x.shape[1], [*self.input_channels(), *self.body_inputs()]
         if (
@@ -271,9 +273,16 @@ class MotionModel(EntityPlugin):
                 )
         rows = []
         for key, column in self.row_params().items():
-            value = np.asarray((params or {}).get(key, own[key]), float)
+            value = numbers_of((params or {}).get(key, own[key]), f"{where}: {key}")
             value = value[:, None] if column.fields and value.ndim == 1 else value
-            rows.append(np.broadcast_to(value, (len(column.fields) or 1, n)))
+            k = len(column.fields) or 1
+            if value.ndim > 2 or any(
+                have not in (1, m) for have, m in zip(value.shape[::-1], (n, k), strict=False)
+            ):
+                raise ParameterError(
+                    f"{where}: {key} has shape {value.shape}; it takes ({f'{k}, ' if k > 1 else ''}{n})"
+                )
+            rows.append(np.broadcast_to(value, (k, n)))
         p = np.ascontiguousarray(np.concatenate(rows)) if rows else np.zeros((0, n))
         integrate = _advance_of(self)
         path = np.empty((len(u) + 1, *x.shape))

@@ -316,9 +316,10 @@ class WorldView(GroupView):
         second: np.ndarray,
         k: int,
     ) -> np.ndarray:
-        world, first, second = (
+        world = numbers_below(self.n_worlds, world, f"worlds of the draw {label!r}")
+        first, second = (
             np.atleast_1d(numbers_of(each, f"numbers of the draw {label!r}", "iu"))
-            for each in (world, first, second)
+            for each in (first, second)
         )
         draw, keys = self._draw(label), self.context.keys[world]
         if self.context.redraws:

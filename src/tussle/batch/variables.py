@@ -359,6 +359,17 @@ def _unit(name: str, text: str) -> str:
 
 
 def _parse_range(name: str, parts: list[str]) -> Range:
+    *_, last = parts
+    word, unit = [*last.split(None, 1), "", ""][:2]
+    upper = QUANTITY.fullmatch(parts[1]) if len(last) + len(parts[1]) <= MAX_TEXT else None
+    if (
+        len(parts) > 2
+        and unit
+        and upper
+        and not upper["unit"]
+        and (WHOLE.fullmatch(word) or word in MODIFIERS)
+    ):
+        parts = [parts[0], f"{parts[1]} {unit}", *parts[2:-1], word]  # "10:30:3 km/h" is "10:30 km/h:3"
     low, high, unit = parse_bounds(name, parts[0], parts[1])
     found: dict[str, int] = {}
     for part in parts[2:]:
@@ -366,7 +377,7 @@ def _parse_range(name: str, parts: list[str]) -> Range:
         if word not in (*MODIFIERS, "levels"):
             raise ParameterError(
                 f"{name}: {clipped(part)!r} behind a range is not allowed{nearest_name(part, MODIFIERS)}; "
-                "allowed are int, log and a whole number of levels"
+                "allowed are int, log and a whole number of levels; a unit is behind the upper bound or at the end, as 10:30:3 km/h"
             )
         if word in found:
             raise ParameterError(f"{name}: {word} is there twice behind the range")

@@ -187,7 +187,8 @@ def show_search(found: FailureSearch, study: Stress, directory: Path, options: S
     )  # fmt: skip
     for number, game in enumerate(found.failures[:MAX_SHOWN] if study.variables else ()):
         put(f" {FAILURES}/{number}.xml: {found.label(game)}")
-    show_failures([game.played for game in found.failures], study, directory, options)
+    of = f"{len(found.failures):,} different failures among {found.n_failed:,} failed games"
+    show_failures([game.played for game in found.failures], study, directory, options, of)
     if found.refused:
         values, error = found.refused[0]
         say_note(f"{len(found.refused):,} sets of values cannot be played, as {label(values)}: {error}")
@@ -252,8 +253,10 @@ def show_importance(
         say_note(note)
 
 
-def show_failures(failures: list[Played], study: Stress, directory: Path, options: StressOptions) -> None:
-    """Show the worst games, and how to see one."""
+def show_failures(
+    failures: list[Played], study: Stress, directory: Path, options: StressOptions, of: str = ""
+) -> None:
+    """Show the worst games, and how to see one; `of` says what they are the worst of, by default their number."""
     if not failures:
         return
     rows = [
@@ -271,7 +274,9 @@ def show_failures(failures: list[Played], study: Stress, directory: Path, option
     ]
     put(*number_tables(["game", "robustness", "fails at [s]", "seed", "branches"], rows))
     if len(failures) > MAX_SHOWN:
-        put(f" the worst {MAX_SHOWN} of {len(failures):,}; {min(len(failures), MAX_FAILURES)} are kept")
+        put(
+            f" the worst {MAX_SHOWN} of {of or f'{len(failures):,}'}; {min(len(failures), MAX_FAILURES)} are kept"
+        )
     put("", f" tussle run {shlex.quote(str(directory / FAILURES / '0.xml'))}{plugin_files(options)}")
 
 

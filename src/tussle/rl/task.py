@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import is_dataclass
 from functools import cached_property
@@ -34,7 +35,8 @@ class Task:
         overrides: Values of the mission's file, as of `read_mission`.
         scripted: The mission of `evaluate` without a policy, in which autonomies play the agents' blocks; by default `mission`, also
             where a `mission` was given later than it, by a subclass or as an argument.
-        learners: Names of the blocks whose entities are agents, separated by spaces; the others play by their autonomies.
+        learners: Names of the blocks whose entities are agents, separated by spaces; the others play by their autonomies. A name that
+            has spaces is in quotes: "'blue team' red".
         observation: Components, in order; or lists of components by name, which environments give as a dict of arrays; or one of these
             per block.
         action: What actions set; or one list per block. Blocks with an empty list play by their autonomies.
@@ -191,11 +193,13 @@ class Task:
     @cached_property
     def blocks(self) -> list[Block]:
         """The given blocks of the agents, in order of the mission."""
-        names, have = self.learners.split(), [b.name for b in self.given.blocks]
+        have = [b.name for b in self.given.blocks]
+        names = _names_in(self.learners, have)
+        quoted = "; a name with spaces is in quotes" if any(" " in name for name in have) else ""
         for name in names:
             if name not in have:
                 raise ParameterError(
-                    f"{type(self).__name__}: learners: there is no block {name!r}{nearest_name(name, have)}; {listed(have)}"
+                    f"{type(self).__name__}: learners: there is no block {name!r}{nearest_name(name, have)}; {listed(have)}{quoted}"
                 )
         if not names:
             raise ParameterError(f"{type(self).__name__}: learners is empty; {listed(have)}")
@@ -369,6 +373,17 @@ class Task:
 def _attributes() -> list[str]:
     """Names of the attributes of a task."""
     return [name for name in Task.__annotations__ if not name.startswith("_")]
+
+
+def _names_in(text: str, known: Sequence[str]) -> list[str]:
+    """Names separated by spaces; those that have spaces themselves are in quotes, but for one alone."""
+    for names in ([text], text.split()):
+        if all(name in known for name in names):
+            return names
+    try:
+        return shlex.split(text)
+    except ValueError:  # a quote that is not closed
+        return text.split()
 
 
 def _made(kind: type[Task], values: dict[str, Any]) -> Task:

@@ -109,6 +109,18 @@ def test_what_is_refused_is_said_in_one_sentence(tussle, changes, message, code)
     assert "Traceback" not in done.stderr
 
 
+def test_different_failures_are_told_from_failed_games(tussle):
+    nearer = ("--spec", "always (distance(left, right) > 9 m)")
+    done = tussle(
+        *STUDY, *nearer, "-n", "60", "--vary", "left.Hover.gust=6:9", "--vary", "right.Hover.gust=1:9"
+    )
+    text = " ".join(done.stdout.split())
+    n_failed = re.search(r"failed (\d+) of 60", text).group(1)
+    assert re.search(
+        rf"the worst 5 of \d+ different failures among {n_failed} failed games; \d+ are kept", text
+    )
+
+
 def test_a_search_for_values_that_fail(tussle, folder):
     search = (*STUDY, "-n", "160", "--vary", "left.Hover.gust=1:9", "--vary", "left.Hover.gain=-0.1:1")
     done = tussle(*search, "--why")

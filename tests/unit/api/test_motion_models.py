@@ -28,6 +28,22 @@ def test_rollout_refuses_what_does_not_fit():
         Car().rollout([0.0] * 4, [[1.0, 0.0]], 0.1, params={"lagg": 1.0})
 
 
+@pytest.mark.parametrize(
+    ("x0", "inputs", "params", "text"),
+    [
+        ([0.0] * 4, {"speed": 1.0}, {}, r"Car.rollout: inputs = \{'speed': 1.0\} is not allowed; it takes numbers"),
+        ([0.0] * 4, [[1.0, 0.0], [1.0]], {}, r"Car.rollout: inputs = .* is not allowed; it takes numbers"),
+        ({"v": 1.0}, [[1.0, 0.0]], {}, r"Car.rollout: x0 = .* is not allowed; it takes numbers"),
+        ([0.0] * 4, [[1.0, 0.0]], {"lag": "short"}, r"Car.rollout: lag = 'short' is not allowed; it takes numbers"),
+        ([0.0] * 4, [[1.0, 0.0]], {"lag": [1.0, 2.0]}, r"Car.rollout: lag has shape \(2,\); it takes \(1\)"),
+        (np.zeros((4, 3)), [[1.0, 0.0]], {"lag": np.ones((2, 3))}, r"Car.rollout: lag has shape \(2, 3\); it takes \(3\)"),
+    ],
+)  # fmt: skip
+def test_rollout_says_what_it_takes(x0, inputs, params, text):
+    with pytest.raises(ParameterError, match=text):
+        Car().rollout(x0, inputs, 0.1, params=params)
+
+
 def test_the_car_obeys_its_lag():
     path = Car(lag=0.5).rollout([0, 0, 0, 0], [[10.0, 0.0]] * 50, 0.02)
     assert path[-1, 3] == pytest.approx(10.0 * (1.0 - np.exp(-1.0 / 0.5)), rel=1e-8)

@@ -28,6 +28,9 @@ from tussle.mission import read_mission
         ("x=0:10:int:5", Range("x", 0, 10, is_int=True, levels=5, is_text=True)),
         ("x=0:10:5:int", Range("x", 0, 10, is_int=True, levels=5, is_text=True)),
         ("x=-20:-10 m:3", Range("x", -20, -10, levels=3, unit="m", is_text=True)),
+        ("x=10:30:3 km/h", Range("x", 10, 30, levels=3, unit="km/h", is_text=True)),
+        ("x=10:30:int kt", Range("x", 10, 30, is_int=True, unit="kt", is_text=True)),
+        ("x=1:9:log: 5  m ", Range("x", 1, 9, is_log=True, levels=5, unit="m", is_text=True)),
         ("tactic=keep,switch", Choice("tactic", ("keep", "switch"), is_text=True)),
         ("tactic = keep , switch ", Choice("tactic", ("keep", "switch"), is_text=True)),
         ("prey.count=50,100,200", Choice("prey.count", (50, 100, 200), is_text=True)),
@@ -58,7 +61,9 @@ def test_texts_of_the_command_line(text, variable):
         "x", "=3", "x=", "x=a,,b", "x=30:20", "x=3:3 kt", "x=nan:3", "x=0:inf", "x=0:1e400", "x=a:3", "x=:3", "x=" + "9" * 300 + ":3",
         "x=0:3:log", "x=0:2.5:int", "x=0:1e17:int", "x=0:1:1", "x=0:1:-3", "x=0:1:2000000", "x=0:3:int:9", "x=1:9:int:log:9",
         "x=a,b,a", "x=1,1.0", "x=1,1e999", "x=0:1:lg", "x=0:1:0.1", "x=0:1:", "x=0:1:5:6", "x=0:1:int:int", "x=20 kt:30 m",
-        "x=20 kt:30", "x=20:30,50", "seed=1,2",
+        "x=20 kt:30", "x=20:30,50",
+        "x=20:30 kt:3 kt", "x=20:30 kt:3 m", "x=20 kt:30:3 m",
+        "x=20:30:3 knots", "x=20:30:3 4", "x=20:30:3kt", "x=20:30:3 kt:int", "seed=1,2",
     ],
 )  # fmt: skip
 def test_a_malformed_text_is_refused_in_one_line_that_names_the_variable(text):

@@ -1,12 +1,15 @@
 """The tasks that come with tussle can be learned: who plays them by rule does better than who acts at random."""
 
+import re
+
 import gymnasium
 import numpy as np
 import pytest
 
-from tussle import rl
-from tussle.errors import DeclarationError
+from tussle import Block, Mission, rl
+from tussle.errors import DeclarationError, ParameterError
 from tussle.rl import Task, evaluate
+from tussle.stock import Still
 
 TASKS = ("Battle", "CaptureTheFlag", "Coverage", "FindWay", "Formation", "Hover", "Intercept", "ReachPoint")
 N = 8
@@ -77,3 +80,28 @@ def test_what_a_task_would_never_use_is_refused_with_what_was_meant(name, value,
     ):
         type("Own", (Task,), {name: value})
     type("Own", (Task,), {meant: value, "bonus": 3.0, "reward_of": None, "_rewards": ()})
+
+
+@pytest.mark.parametrize(
+    ("learners", "names"),
+    [
+        ("blue team", ["blue team"]),
+        ("red", ["red"]),
+        ("'blue team' red", ["blue team", "red"]),
+        ('red "blue team"', ["blue team", "red"]),
+        ("d'Or red", ["d'Or", "red"]),
+        ("blue red",
+         "there is no block 'blue' (did you mean 'blue team'?); there are: d'Or, blue team, red; a name with spaces is in quotes"),
+        ("'blue team", "there is no block \"'blue\""),
+        ("", "learners is empty"),
+    ],
+)  # fmt: skip
+def test_blocks_whose_names_have_spaces_can_learn(learners, names):
+    blocks = [Block(name=name, motion=Still()) for name in ("d'Or", "blue team", "red")]
+    task = Task.__new__(Task)
+    task.__dict__.update(_given={}, mission=Mission(blocks=blocks), learners=learners)
+    if isinstance(names, str):
+        with pytest.raises(ParameterError, match=re.escape(names)):
+            _ = task.blocks
+    else:
+        assert [b.name for b in task.blocks] == names
