@@ -6,6 +6,8 @@ import needs
 import pytest
 from pages import FENCE, PAGES, ROOT, examples, namespace, run
 
+from tussle.mission import shipped_missions
+
 IDS = [page.name for page in PAGES]
 SLOW = ("cluster.md", "optimize.md", "six-degrees.md")
 """Pages that start a cluster, search, or compile a whole aircraft."""
@@ -41,6 +43,18 @@ def test_every_page_of_the_guide_can_be_reached_from_its_index():
     index = (ROOT / "docs" / "index.md").read_text()
     for page in (ROOT / "docs").glob("*.md"):
         assert page.name == "index.md" or f"({page.name})" in index, page.name
+
+
+def test_the_table_of_missions_has_each_with_all_its_placeholders():
+    text = (ROOT / "docs" / "mission-format.md").read_text()
+    table = text.split("| mission | game |")[1].split("\n\n")[0]
+    rows = [line.split("|") for line in table.splitlines() if line.startswith("| `")]
+    words = [(re.findall(r"`(\w+)`", row[1]), re.findall(r"`(\w+)`", row[-2])) for row in rows]
+    told = {name: sorted(placeholders) for names, placeholders in words for name in names}
+    assert told == {
+        name: sorted(set(re.findall(r"\$\{(\w+)=", path.read_text())))
+        for name, (path, _) in shipped_missions().items()
+    }
 
 
 def test_a_wrong_output_is_noticed(tmp_path):

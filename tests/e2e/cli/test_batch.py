@@ -288,7 +288,7 @@ WRONG = {
     "no such motion model": (["chance.xml", "--vary", "reds.motion_model=Still,Stil"], 1, "(did you mean 'Still'?)"),
     "nobody steers": (["chance.xml", "--vary", "reds.motion_model=Still,Unicycle"], 1, "block 'reds': no plugin writes channel"),
     "fewer than none": (["chance.xml", "--vary", "reds.count=-1,2"], 1, "point 0 (reds.count=-1): "),
-    "end before start": (["chance.xml", "--end", "0"], 1, "--end 0 is not allowed"),
+    "end before start": (["chance.xml", "--end", "0"], 1, "value set from outside: end = 0 s is not allowed; with start = 0 s and dt = "),
     "end is no time": (["chance.xml", "--end", "soon"], 1, "--end: 'soon' is not a number"),
     "no such method": (["chance.xml", "--vary", "odds=0.1:0.3", "--sample", "lsh"], 1, "(did you mean 'lhs'?)"),
     "until without width": (["chance.xml", "--until", "score[1]"], 1, "until 'score[1]': 'score[1]' is no number"),
