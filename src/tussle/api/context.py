@@ -70,7 +70,7 @@ class Context:
         steady_steps: This number where rows stay the same for long, and where they do not: to pack takes as long as ten steps save.
         later: What `GroupView.finish` is called with, where the calls of kernels are recorded.
         is_interrupted: Whether the user asked to stop; a plugin that waits for others then waits no longer.
-        redraws: Draws with keys of their own; of several that name a draw, the last one counts.
+        redraws: Draws with keys of their own; if several apply to one draw, the last one is used.
         streams: Plugin and label of each random stream that has been drawn from.
         has_chance: Whether anything after the births has drawn or read the seeds.
     """

@@ -2,7 +2,7 @@
 
 A game is its mission, its seed and its re-keys. One with other re-keys from step k on is a branch: the same game up to the state at the
 start of step k, and then other luck. A re-key with a target is for some draws only: those of a block, an entity, a plugin or a label.
-Of several that name a draw, the last one counts: one of the whole world ends those before it.
+If several re-keys apply to one draw, the last one is used. A re-key without a target ends all re-keys before it.
 
 The target left/2/birth is for what is drawn before step 0: where the entity starts, and what its plugins draw as it is born.
 """

@@ -267,7 +267,7 @@ def test_a_plugin_that_fails_ends_the_game_and_what_was_played_is_kept(tussle, f
         (["run", "game.xml", "--set", "prey.Boids.max_sped=3"], 1, "did you mean 'max_speed'?"),
         (["run", "game.xml", "--set", "prey.Boids.max_speed=3 kg"], 1, "kg"),
         (["run", "game.xml", "--set", "pry.Boids.max_speed=3"], 1, "did you mean 'prey'?"),
-        (["run", "game.xml", "--end", "-3"], 1, "value set from outside: end = -3 s is not allowed; with start = 0 s and dt = 0.1 s it takes a time > 0.05 s"),
+        (["run", "game.xml", "--end", "-3"], 1, "end = -3 s is not allowed; with start = 0 s and dt = 0.1 s it takes a time > 0.05 s"),
         (["run", "game.xml", "--end", "soon"], 1, "--end: 'soon'"),
         (["run", "game.xml", "--plugin-path", "no.py"], 1, "no.py: there is no such plugin file"),
         (["run", "game.xml", "--plugin-path", "."], 1, ".: it is a folder; a plugin file is one Python file; in the folder there are"),

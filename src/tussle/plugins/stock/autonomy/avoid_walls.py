@@ -15,9 +15,10 @@ SLOW = 10.0
 class AvoidWalls(Autonomy):
     """Drives straight on, and turns away from walls that `RayTrace` sees within `avoid_distance`.
 
-    Each of these points repels with `avoid_distance` - range, those nearer than the lidar's `min_range` with `avoid_distance`. The car
-    drives slowly in the direction of the sum. If all rays of the scan end near, it turns to its right. Potential fields: O. Khatib,
-    IJRR 5 (1986), 90-98, with a linear law.
+    Each point that the lidar sees within this distance pushes the car away from it, with a force of `avoid_distance` - range, or of
+    `avoid_distance` for points nearer than the lidar's `min_range`. The car drives slowly in the direction of the sum of these forces. If
+    all rays of the scan end within the distance, it turns to its right. Potential fields: O. Khatib, IJRR 5 (1986), 90-98, with a linear
+    law.
 
     In SCRIMMAGE a car that has slowed down never accelerates again.
     """

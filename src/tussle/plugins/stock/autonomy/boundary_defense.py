@@ -10,9 +10,9 @@ from tussle.api import Autonomy, GroupView, Output, Param, unit
 class BoundaryDefense(Autonomy):
     """Flies to the nearest entity inside a boundary that is not of the boundary's team; without one, to the centre.
 
-    It aims at the position of the intruder one step ahead. The desired speed is the distance to that point, divided by 1 s, plus the
-    speed of the intruder; limit it with `SingleIntegrator.max_speed`. In SCRIMMAGE it was without that of the intruder, and a
-    defender learned of its boundary by a message at the end of the first step, and stood still until then.
+    It aims at the position of the intruder one step ahead. The desired speed is the distance to that point, divided by 1 s, plus the speed
+    of the intruder; limit it with `SingleIntegrator.max_speed`. In SCRIMMAGE the speed of the intruder was not added, and a defender
+    learned of its boundary by a message at the end of the first step, and stood still until then.
 
     Raises:
         MissionError: `boundary_id` is not the id of exactly one boundary of the mission.

@@ -13,13 +13,13 @@ AWAY = 1e-9  # [m/s], below which a leader has no course
 
 
 class HoldFormation(Autonomy):
-    """Joins the nearest entity of `leader_team`, and keeps a place of a formation behind it; joins another when it is removed.
+    """Follows the nearest entity of `leader_team` in a formation behind it; when that entity is removed, follows another.
 
-    Those with one leader take the places in the order of their ids, and close up when one is removed. The desired velocity is that of
-    the leader plus `gain` times the offset to the place, which turns with the leader's course (leader-referenced formations of Balch
-    and Arkin 1998, "Behavior-based formation control for multirobot teams", IEEE Transactions on Robotics and Automation 14(6)).
-    Without a leader it keeps its course at `min_speed`. With a channel `altitude_above_terrain` it stays at least `clearance` above the
-    surface.
+    The followers of a leader take the places of the formation in the order of their ids, and move up when one of them is removed. The
+    desired velocity is that of the leader plus `gain` times the offset to the place, which turns with the leader's course
+    (leader-referenced formations of Balch and Arkin 1998, "Behavior-based formation control for multirobot teams", IEEE Transactions on
+    Robotics and Automation 14(6)). Without a leader it keeps its course at `min_speed`. With a channel `altitude_above_terrain` it stays at
+    least `clearance` above the surface.
     """
 
     grade = "portable"

@@ -18,7 +18,7 @@ from tussle.numeric import atan2
 
 
 class MotorSchemas(StateFollower):
-    """Combines the velocities of its behaviours (Arkin 1989): their sum weighted by gain, over the sum of the gains of nonzero velocities.
+    """Combines the velocities of its behaviours (Arkin 1989): the mean of those that are not zero, weighted by their gains.
 
     A behaviour whose velocity is zero, for example avoidance without other entities nearby, therefore does not dilute the others. If
     all are zero, the entity flies straight on at `max_speed`. The result is written as heading, altitude and speed, and as `velocity`.

@@ -29,8 +29,8 @@ SPAWN_PERIOD = 2.0  # [s]
 class Straight(Autonomy):
     """Holds the initial heading, altitude and speed.
 
-    With `enable_boundary_control` an entity outside the boundary that it last received turns back: towards the centre, or straight
-    across a plane. It keeps its altitude. If no heading leads back, as at a horizontal plane, it flies on.
+    With `enable_boundary_control` an entity outside the boundary that it last received turns back: towards the centre, or straight across a
+    plane. It keeps its altitude. If turning cannot bring it back, as below a boundary that begins above it, it flies on.
     """
 
     grade = "portable"

@@ -19,9 +19,9 @@ MIN_SPEED = 1.0  # [m/s], where a climb speed is divided by the speed
 class AircraftPIDController(Controller):
     """Controls heading (or bank), altitude and speed of an aircraft by throttle, elevator and aileron; the rudder is 0.
 
-    Heading to bank to aileron; altitude to climb speed, that over the speed to the slope of the path, slope to elevation (see
-    `tussle.numeric.pid.slope_error`) to elevator; speed to throttle. Surfaces and throttle are clamped to [-1, 1]. The integral of a
-    loop is zero while its error exceeds `band`.
+    The heading error commands a bank, and the error of the bank the aileron. The altitude error commands a climb speed; divided by the
+    speed this is a slope of the path, whose error (see `tussle.numeric.pid.slope_error`) commands the elevator. The speed error commands
+    the throttle. Surfaces and throttle are clamped to [-1, 1]. The integral of a loop is zero while its error exceeds `band`.
 
     Differences from SCRIMMAGE: there the altitude error times the gain was an elevation, so that the default of 0.1 rad/m
     made a fast aircraft pitch from -45 to 45 degrees for ever; here it is a climb speed, and the trim is integrated. The time

@@ -19,8 +19,8 @@ class SimpleQuadrotorControllerLQR(Controller):
     """Brings a SimpleQuadrotor to a point and a heading.
 
     Height and heading by linear-quadratic regulators, u = -e - sqrt(2) e' (Anderson and Moore 1990, Optimal Control, section 3.1). The
-    horizontal velocity goes to one towards the point, of a tenth of the distance per second and at most max_vel, with a PID loop for
-    each axis of the heading's frame; its integral is zero while the error exceeds vel_i_lim.
+    desired horizontal velocity points towards the point; its size is a tenth of the distance per second, at most max_vel. A PID loop for
+    each horizontal axis, along the heading and to its left, follows it; the integral of a loop is zero while its error exceeds vel_i_lim.
 
     SCRIMMAGE commands the speed along the nose only, wherever the point is, and coasts within 10 m of it.
     """

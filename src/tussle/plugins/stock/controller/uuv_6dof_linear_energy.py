@@ -11,7 +11,7 @@ from tussle.numeric import clip
 
 
 class UUV6DOFLinearEnergy(Controller):
-    """Passes throttle, elevator and rudder on; the battery loses the absolute value of the throttle times the time.
+    """Passes throttle, elevator and rudder on, and discharges a battery: per second, by the absolute value of the throttle.
 
     When the energy is at energy_min, the throttle is 0.
 

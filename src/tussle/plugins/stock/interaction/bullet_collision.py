@@ -22,14 +22,15 @@ FAST = 1e150
 class BulletCollision(Interaction):
     """Prevents overlaps of bodies with each other, and with walls, meshes, terrain and ground: bodies bounce, slide and rest.
 
-    A body is a sphere of its block's radius, a box where the block has one, or a capsule inside that box for the blocks in `capsules`.
-    Sequential impulses (Catto 2005) at the contacts change the velocities; Coulomb friction, Newton's restitution. Bodies with an
-    inertia tensor turn (motion models such as FreeBody and Multirotor); all others move without turning. A motion model that sets
-    its velocity from commands in each step, such as SingleIntegrator, drives into what is in its way: it is held there and slides along.
+    A body is a sphere of its block's radius, a box where the block has one, or a capsule inside that box for the blocks in `capsules`. The
+    velocities are changed by impulses at the contacts, found by iteration (sequential impulses, Catto 2005), with Coulomb friction and
+    Newton's law of restitution. Bodies with an inertia tensor turn (motion models such as FreeBody and Multirotor); all others move without
+    turning. A motion model that sets its velocity from commands in each step, such as SingleIntegrator, drives into what is in its way: it
+    is held there and slides along.
 
-    Fast bodies are followed on their straight way of the step, so that they do not pass through others and the scene, however thin;
-    of a box, the sphere or capsule along its x axis that fits inside. `EntityCollided` and `EntityHitGround` are published when a
-    contact begins.
+    Collision detection is continuous: each fast body is followed along a straight line during the step, so that it does not pass through
+    other bodies or the scene, however thin. A box is followed as the sphere, or the capsule along its x axis, that fits inside.
+    `EntityCollided` and `EntityHitGround` are published when a contact begins.
 
     In SCRIMMAGE all bodies are spheres; a contact sets the external force to 1 N along the normal, so that a SimpleCar stops.
     """

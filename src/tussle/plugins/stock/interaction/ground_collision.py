@@ -87,12 +87,12 @@ class Ground(Interaction):
 class GroundCollision(Ground):
     """Removes entities that reach the ground level, or lets them land and stand on it.
 
-    Without `remove_on_collision` the ground is a contact for motion models that forces act on. Its force is chosen once in a step so
-    that the entity's position arrives at the ground without passing it, and rests there: it stops the fall in the last step and a
-    half, bears what of the weight the entity's own thrust and lift did not in the last step, and never pulls. Friction stops what
-    slides, with at most `friction` times the normal force. Bodies that turn stand on feet that are their radius apart: the contact
-    stops their rotation and levels them, with at most the moment of the normal force about a foot. Weight, mass and inertia are those
-    of the motion model.
+    Without `remove_on_collision` the ground is a contact for motion models that forces act on. Its force is chosen once in a step so that
+    the entity's position arrives at the ground without passing it, and rests there. The force stops the fall in the last step and a half
+    before the ground, then supports the part of the weight that the entity's own thrust and lift did not support in the last step, and
+    never pulls. Friction stops what slides, with at most `friction` times the normal force. Bodies that turn stand on feet that are their
+    radius apart: the contact stops their rotation and levels them, with at most the moment of the normal force about a foot. Weight, mass
+    and inertia are those of the motion model.
 
     Publishes `EntityHitGround` when an entity touches the ground; SCRIMMAGE published it in every step on the ground. It
     also rejects initial positions at or below the ground.

@@ -149,7 +149,7 @@ def _turned(slope: np.ndarray, tangent: np.ndarray, beyond: float) -> np.ndarray
 
 
 class ContactBlobCameraNoNoise(ContactBlobCamera):
-    """ContactBlobCamera with exact centres of the boxes, which misses no entity and has no false positives."""
+    """A ContactBlobCamera without errors: the centres of the boxes are exact, no entity is missed, and there are no false positives."""
 
     false_negative_probability = Param(
         0.0, ge=0.0, le=1.0, doc="Probability that an entity in view is missed."

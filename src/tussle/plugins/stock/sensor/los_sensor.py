@@ -13,10 +13,11 @@ from tussle.numeric.quaternion import quat_from_euler, quat_multiply, quat_rotat
 class LOSSensor(Sensor):
     """Measures the range of the ground along a line of sight: a laser altimeter, if `rpy` turns it down.
 
-    The line begins at `xyz` on the body and points along its x axis, turned by `rpy`. The range is `oor_return` where nothing is
-    within `max_range`, and -inf where the ground is nearer than `min_range` (REP 117 of ROS). With the probability
-    `probability_oor_error` a range counts as beyond `max_range`, or one out of range as at the nearest limit. A range has an error
-    with standard deviation `range_sd_min` + `range_sd_per_unit` * range, and with `probability_of_error` another one of `error_sd`.
+    The line begins at `xyz` on the body and points along its x axis, turned by `rpy`. The range is `oor_return` where nothing is within
+    `max_range`, and -inf where the ground is nearer than `min_range` (REP 117 of ROS). With the probability `probability_oor_error` a
+    measurement is wrong about the limits: one in range is reported as beyond `max_range`, and one out of range as the nearest limit. A
+    range has an error with standard deviation `range_sd_min` + `range_sd_per_unit` * range, and with `probability_of_error` another one of
+    `error_sd`.
 
     In SCRIMMAGE `oor_return` is 150 m, and the range where the ground is too near. It uses the limits only if `probability_oor_error`
     is not 0, does not repeat its draws, and sees the scene unless `use_flat_earth` is true.

@@ -18,11 +18,12 @@ ROUGH = 60.0
 class SimpleINS(Sensor):
     """Dead reckoning by an inertial navigation system, as the entity's belief.
 
-    The position error is a random walk: in a second it grows by noise with mean and standard deviation `pos_noise`, times the
-    acceleration along the axis in m/s^2, at most 1. After a GPS of the entity has had a fix for the surface time, error and variance
-    are reset; the surface time is drawn when the fix is lost. Velocity and attitude have independent noise at each call, the attitude about
-    the body's x, then y, then z axis. `ins_cep` is the radius of the circle around the belief that holds the position with a
-    probability of 50 %, from the standard deviations of the horizontal error, 1 m after a correction; the approximation is within 1.5 %.
+    The position error is a random walk: on each axis it grows, per second, by a normal number with the mean and the standard deviation of
+    `pos_noise`, times the acceleration along this axis in m/s^2 (a factor of at most 1). After a GPS of the entity has had a fix for the
+    surface time, error and variance are reset; the surface time is drawn when the fix is lost. Velocity and attitude have independent noise
+    at each call, the attitude about the body's x, then y, then z axis. `ins_cep` is the radius of the circle around the belief that holds
+    the position with a probability of 50 %, from the standard deviations of the horizontal error, 1 m after a correction; the approximation
+    is within 1.5 %.
 
     SCRIMMAGE added the noise in each step, whatever its length; took the change of velocity over 0.01 s for the acceleration;
     and grew the variance by the absolute value of noise that was not that of the error.

@@ -12,9 +12,9 @@ from tussle.plugins.stock.autonomy.predator import kernels
 class Predator(Autonomy):
     """Pursues the nearest prey (pure pursuit) and claims every entity of another team within `capture_range`.
 
-    It also claims those that come within that range during the step if both move straight on.
-    Without `allow_prey_switching` a target is kept until it is removed. Claims include rival predators, as in the paper's code.
-    When no prey is left, the last commands persist. Without `pursue` it only claims, and another autonomy of the entity flies.
+    It also claims those that come within that range during the step if both move straight on. Without `allow_prey_switching` a target is
+    kept until it is removed. Claims include rival predators, as in the paper's code. When no prey is left, the last commands stay. With
+    `pursue="false"` it only claims, and another autonomy of the entity must steer.
     """
 
     grade = "portable"

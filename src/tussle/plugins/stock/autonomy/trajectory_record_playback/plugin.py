@@ -16,11 +16,11 @@ from tussle.plugins.stock.autonomy.trajectory_record_playback.table import read_
 
 
 class TrajectoryRecordPlayback(Autonomy):
-    """Plays a recorded trajectory: desires the state that the recorded entity had at the end of the step.
+    """Plays a recorded trajectory: the desired state is the one that the recorded entity had at the end of the step.
 
-    The file is a table in CSV with the columns of a recorded run, as `tussle export --csv` writes it. Before the first recorded time
-    the first state is desired. After the last one the entity is removed, or the last state persists. Without `enable_playback` the
-    plugin does nothing, since every run can be recorded; SCRIMMAGE's plugin then records the file.
+    The file is a table in CSV with the columns of a recorded run, as `tussle export --csv` writes it. Before the first recorded time the
+    desired state is the first one. After the last recorded time the entity is removed, or the last state stays the desired one. Without
+    `enable_playback` the plugin does nothing, since every run can be recorded; SCRIMMAGE's plugin then records the file.
     """
 
     grade = "portable"
