@@ -5,11 +5,14 @@ from __future__ import annotations
 import os
 import pty
 import re
+import shlex
 import subprocess
 import termios
 
 import pytest
 from cli_process import COMMAND, environment
+
+from tussle.record import load_run
 
 ESCAPE = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]")
 
@@ -80,3 +83,18 @@ def test_a_text_as_long_as_a_file_fills_a_screen_at_most(folder, process):
         done = process(*command)
         assert len(done.stdout) + len(done.stderr) < 20_000
         assert "more characters" in done.stdout
+
+
+@pytest.mark.parametrize("closed", [(0,), (1,), (2,), (0, 1, 2)], ids=str)
+def test_closed_streams_are_as_the_null_device(folder, closed):
+    """Nothing that is printed gets into a file that would have the number of a closed stream, and the game is recorded whole."""
+    shell = " ".join(f"{number}>&-" for number in closed)
+    run = f"{shlex.join(COMMAND)} run game.xml --end 1 --out run {shell}"
+    done = subprocess.run(
+        ["sh", "-c", run], cwd=folder, env=environment(), capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    assert ("hash" in done.stdout) == (1 not in closed)
+    whole = load_run(folder / "run")
+    assert whole.notes == []
+    assert len(whole.trajectory)
