@@ -9,7 +9,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from tussle.batch.quantities import column_name
-from tussle.batch.schemas import PLAYED_BY_CHANCE
+from tussle.batch.schemas import CHANCE, PLAYED_BY_CHANCE
 
 FACTS = ("end", "t", "steps", "winner", "error", "state_hash", "cpu_s", "host")
 """Columns of the results that are the same in all rows of a run, in the order in which the table of runs has them."""
@@ -91,7 +91,7 @@ def distinct_games(runs: pa.Table, failed: np.ndarray, quantities: Collection[np
         quantities: Each result of the runs, (n_runs,).
     """
     game, point = np.arange(len(failed)), runs["point"].to_numpy()
-    chance = runs["chance"].to_numpy()
+    chance = runs[CHANCE].to_numpy()
     if failed.all() or (chance == PLAYED_BY_CHANCE).any():
         return game
     text = pc.fill_null(runs["state_hash"].combine_chunks(), "").dictionary_encode()

@@ -17,7 +17,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from tussle.batch.consistency import check_design, check_metrics, check_results
-from tussle.batch.schemas import BATCH, PLAYED_BY_CHANCE, RULES
+from tussle.batch.schemas import BATCH, CHANCE, PLAYED_BY_CHANCE, RULES
 from tussle.batch.tasks import Finished
 from tussle.documents import is_count, json_text
 from tussle.errors import BatchError, RecordError
@@ -47,7 +47,7 @@ PLAYED = pa.schema(
         ("steps", pa.int32()),
         ("winner", pa.int32()),
         ("state_hash", pa.string()),
-        ("chance", pa.uint8()),
+        (CHANCE, pa.uint8()),
         ("error", pa.string()),
         ("cpu_s", pa.float64()),
         ("host", pa.string()),
@@ -60,7 +60,7 @@ PLAYED = pa.schema(
 IS_OWN = (BATCH_FILE, f"{BATCH_FILE}.part", LOCK)
 """Files that a directory may have before its batch has begun: a batch may have been killed then."""
 
-OF_RUN = ("end", "t", "steps", "winner", "state_hash", "chance", "error", "cpu_s", "host")
+OF_RUN = ("end", "t", "steps", "winner", "state_hash", CHANCE, "error", "cpu_s", "host")
 
 RESULTS = pa.schema(
     [
@@ -334,8 +334,9 @@ def read_played(path: Path) -> tuple[pa.Table, list[str]]:
     """
     parts, notes = [PLAYED.empty_table()], list[str]()
     for file in sorted((path / PARTS).glob("*.arrow")):
-        batches = list(read_batches(file, [], BatchError, PLAYED, RULES, damage=notes))
-        parts.append(pa.Table.from_batches(batches, PLAYED).combine_chunks())
+        batches = list(read_batches(file, [], BatchError, PLAYED, RULES, damage=notes, optional=[CHANCE]))
+        if batches:
+            parts.append(_with_chance(pa.Table.from_batches(batches), PLAYED).combine_chunks())
     return pa.concat_tables(parts), notes
 
 
@@ -354,9 +355,18 @@ def read_table(path: Path, name: str, columns: pa.Schema, notes: list[str] | Non
     file = path / name
     if not file.exists():
         return None
-    table = read_parquet(file, columns, BatchError, notes=notes)
+    table = _with_chance(read_parquet(file, columns, BatchError, notes=notes, optional=[CHANCE]), columns)
     check_values(zip(table.column_names, table.columns, strict=True), RULES, file, BatchError)
     return table
+
+
+def _with_chance(table: pa.Table, columns: pa.Schema) -> pa.Table:
+    """A table of a batch. Older versions did not tell what depends on the seed: 0 is there, so that runs are copies if all end alike."""
+    if CHANCE not in columns.names or CHANCE in table.column_names:
+        return table
+    return table.add_column(
+        columns.get_field_index(CHANCE), columns.field(CHANCE), pa.array(np.zeros(table.num_rows, np.uint8))
+    )
 
 
 def finished_in(results: pa.Table) -> Iterator[Finished]:
@@ -453,9 +463,9 @@ def merged(path: Path, played: pa.Table, design: pa.Table, notes: list[str]) -> 
 
 def _with_one_chance(results: pa.Table) -> pa.Table:
     """A table of results in which plugins of all runs draw if those of one do; whose stack that was, depends on how runs are played."""
-    if not pc.any(pc.equal(results["chance"], PLAYED_BY_CHANCE)).as_py():
+    if not pc.any(pc.equal(results[CHANCE], PLAYED_BY_CHANCE)).as_py():
         return results
-    column = results.schema.get_field_index("chance")
+    column = results.schema.get_field_index(CHANCE)
     full = np.full(results.num_rows, PLAYED_BY_CHANCE, np.uint8)
     return results.set_column(column, results.schema.field(column), pa.array(full))
 

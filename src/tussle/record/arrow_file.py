@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from pathlib import Path
 
 import pyarrow as pa
@@ -29,6 +29,7 @@ def read_batches(
     *,
     is_mapped: bool = False,
     damage: list[str] | None = None,
+    optional: Collection[str] = (),
 ) -> Iterator[pa.RecordBatch]:
     """Yield the complete and undamaged batches of a file, in order.
 
@@ -40,6 +41,7 @@ def read_batches(
         rules: Allowed values by column.
         is_mapped: Leave the rows in the file, which is mapped into memory, and check no values.
         damage: Receives a line if blocks are damaged; None if that is an error.
+        optional: Names of required columns that files of older versions lack.
 
     Raises:
         TussleError: As `error`: the file is not a regular file, has other columns, is compressed, or a batch is invalid.
@@ -58,12 +60,12 @@ def read_batches(
         elif not blocks.intact:
             notes.append(f"{path.name} is truncated before its first batch")
             return
-        for found in _batches(path, blocks, schema, is_mapped):
+        for found in _batches(path, blocks, schema, is_mapped, optional):
             batch = (
                 found
                 if schema is None
                 else pa.RecordBatch.from_arrays(
-                    found.columns, schema=with_plugin_columns(found.schema, schema)
+                    found.columns, schema=with_plugin_columns(found.schema, schema, optional)
                 )
             )
             batch.validate(full=not is_mapped)
@@ -88,7 +90,7 @@ def damage_of(path: Path, blocks: StreamBlocks) -> str:
 
 
 def _batches(
-    path: Path, blocks: StreamBlocks, schema: pa.Schema | None, is_mapped: bool
+    path: Path, blocks: StreamBlocks, schema: pa.Schema | None, is_mapped: bool, optional: Collection[str]
 ) -> Iterator[pa.RecordBatch]:
     """The batches of the intact blocks.
 
@@ -96,20 +98,20 @@ def _batches(
         InvalidStreamError: The file has other columns, or its schema is damaged and not known.
     """
     if blocks.lost:
-        yield from _batches_of_damaged(path, blocks, schema)
+        yield from _batches_of_damaged(path, blocks, schema, optional)
         return
     with pa.memory_map(str(path)) if is_mapped else pa.OSFile(str(path), "rb") as file:
         reader = pa.ipc.open_stream(
             file.read_buffer(blocks.end) if is_mapped else file.get_stream(0, blocks.end)
         )
         if schema is not None:
-            _check_schema(reader.schema, schema)
+            _check_schema(reader.schema, schema, optional)
         while (batch := _next(reader)) is not None:
             yield batch
 
 
 def _batches_of_damaged(
-    path: Path, blocks: StreamBlocks, schema: pa.Schema | None
+    path: Path, blocks: StreamBlocks, schema: pa.Schema | None, optional: Collection[str]
 ) -> Iterator[pa.RecordBatch]:
     """The batches of the intact blocks, each with its dictionaries. If the schema in the file is damaged, the required one is used."""
     head = None if schema is None else schema.serialize().to_pybytes()
@@ -124,7 +126,7 @@ def _batches_of_damaged(
             else:
                 reader = pa.ipc.open_stream(head + data)
                 if schema is not None:
-                    _check_schema(reader.schema, schema)
+                    _check_schema(reader.schema, schema, optional)
                 yield reader.read_next_batch()
 
 
@@ -135,22 +137,28 @@ def _next(reader: pa.RecordBatchReader) -> pa.RecordBatch | None:
         return None
 
 
-def same_columns(found: pa.Schema, wanted: pa.Schema) -> str:
-    """Describe the first column that is missing or has another type; "" if there is none."""
+def same_columns(found: pa.Schema, wanted: pa.Schema, optional: Collection[str] = ()) -> str:
+    """Describe the first column that is missing, unless it is optional, or has another type; "" if there is none."""
+    wanted = _required(found, wanted, optional)
     types = dict(zip(found.names, found.types, strict=True))
     wrong = [column for column in wanted if types.get(column.name) != column.type]
     return f"it has no column {wrong[0].name!r} of {wrong[0].type}" if wrong else ""
 
 
-def with_plugin_columns(found: pa.Schema, wanted: pa.Schema) -> pa.Schema:
+def _required(found: pa.Schema, wanted: pa.Schema, optional: Collection[str]) -> pa.Schema:
+    return pa.schema([each for each in wanted if each.name in found.names or each.name not in optional])
+
+
+def with_plugin_columns(found: pa.Schema, wanted: pa.Schema, optional: Collection[str] = ()) -> pa.Schema:
     """The required columns, and the columns of plugins that a table has behind them."""
+    wanted = _required(found, wanted, optional)
     return pa.schema([*wanted, *(part for part in list(found)[len(wanted) :] if is_of_plugin(part))])
 
 
-def _check_schema(found: pa.Schema, wanted: pa.Schema) -> None:
-    difference = same_columns(found, wanted)
+def _check_schema(found: pa.Schema, wanted: pa.Schema, optional: Collection[str]) -> None:
+    difference = same_columns(found, wanted, optional)
     if not difference and (
-        len({*found.names}) < len(found) or found.names != with_plugin_columns(found, wanted).names
+        len({*found.names}) < len(found) or found.names != with_plugin_columns(found, wanted, optional).names
     ):
         difference = "it has other columns than a table of tussle"
     if difference:

@@ -34,6 +34,7 @@ def read_parquet(
     only: Collection[str] | None = None,
     most_rows: int = 2**40,
     notes: list[str] | None = None,
+    optional: Collection[str] = (),
 ) -> pa.Table:
     """Read a table, without its damaged row groups.
 
@@ -44,6 +45,7 @@ def read_parquet(
         only: Names of the columns to read, if present; None for all.
         most_rows: Maximum number of rows.
         notes: Receives a line if row groups are damaged, or if the file cannot be read; None if that is an error.
+        optional: Names of required columns that files of older versions lack.
 
     Raises:
         TussleError: As `error`: the file is not a regular file, is not such a table, is damaged, or takes too much memory for its
@@ -59,7 +61,7 @@ def read_parquet(
             raise error(f"{path}: {problem}")
         with pq.ParquetFile(path) as file:
             schema = file.schema_arrow
-        if difference := same_columns(schema, wanted):
+        if difference := same_columns(schema, wanted, optional):
             raise error(f"{path}: is another table; {difference}")
         names = [name for name in schema.names if only is None or name in only]
         if problem := _columns_problem(schema, names):

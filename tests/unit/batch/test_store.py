@@ -21,6 +21,9 @@ from tussle.batch.plan import BatchPlan
 from tussle.batch.store import Store
 from tussle.batch.tasks import Finished
 from tussle.errors import BatchError, RecordError
+from tussle.record.arrow_file import read_batches
+from tussle.record.parquet_blocks import write_parquet
+from tussle.record.stream import Stream
 
 TABLES = (store.ALIVE_FILE, store.RESULTS_FILE, store.DESIGN_FILE)
 
@@ -72,6 +75,44 @@ def reference(mission, tmp_path):
     """A batch that nothing has disturbed."""
     play(batch_of(mission), tmp_path / "reference")
     return tmp_path / "reference"
+
+
+# -- versions -----------------------------------------------------------------------------------------------------------------
+
+
+def as_before_chance_was_told(path):
+    """Rewrite a batch directory as versions without the column `chance` have left it."""
+    if (path / store.RESULTS_FILE).exists():
+        older = pq.read_table(path / store.RESULTS_FILE).drop_columns([store.CHANCE])
+        write_parquet(older, path / store.RESULTS_FILE)
+    schema = store.PLAYED.remove(store.PLAYED.get_field_index(store.CHANCE))
+    for part in list((path / store.PARTS).glob("*.arrow")):
+        (batch,) = read_batches(part, [], BatchError)
+        part.unlink()
+        stream = Stream(part, schema)
+        stream.write(pa.RecordBatch.from_arrays([batch[name] for name in schema.names], schema=schema))
+        stream.close()
+
+
+@pytest.mark.parametrize("is_killed", [False, True])
+def test_directories_of_versions_that_did_not_tell_chance_are_read_and_gone_on_with(
+    mission, tmp_path, reference, is_killed
+):
+    path = tmp_path / "older"
+    if is_killed:
+        stopped(batch_of(mission), path, 3)
+    else:
+        play(batch_of(mission, runs=2), path)
+    as_before_chance_was_told(path)
+    assert load_batch(path).n_runs
+    play(batch_of(mission), path)
+    found, wanted = (load_batch(each) for each in (path, reference))
+    assert found.n_distinct == wanted.n_distinct == 12
+    assert [
+        t.drop_columns([store.CHANCE] if store.CHANCE in t.column_names else []) for t in tables_of(path)
+    ] == [
+        t.drop_columns([store.CHANCE] if store.CHANCE in t.column_names else []) for t in tables_of(reference)
+    ]
 
 
 # -- tables -------------------------------------------------------------------------------------------------------------------

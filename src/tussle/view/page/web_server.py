@@ -93,7 +93,12 @@ class WebServer:
             task.cancel()
         if self._before_end is not None:
             await self._before_end()
+        connections = [each.transport for each in runner.server.connections] if runner.server else []
         await runner.cleanup()
+        for connection in connections:  # one whose browser does not read stays open
+            if connection is not None:
+                connection.abort()
+        await asyncio.sleep(0)
 
     async def _set_headers(self, _: web.Request, response: web.StreamResponse) -> None:
         response.headers.update(self._headers)
