@@ -32,6 +32,7 @@ OWN_READERS = {
     "src/tussle/record/parquet_file.py": "tables, after a check of the size",
     "src/tussle/batch/damage.py": "tables, after a check of the size",
     "src/tussle/folders.py": "safe access to files of the user",
+    "src/tussle/cli/__init__.py": "the null device",
     "src/tussle/cli/terminal.py": "the null device",
     "src/tussle/plugins/stock/autonomy/joystick/device.py": "a device of the system",
 }
