@@ -72,7 +72,7 @@ class Context:
         is_interrupted: Whether the user asked to stop; a plugin that waits for others then waits no longer.
         redraws: Draws with keys of their own; if several apply to one draw, the last one is used.
         streams: Plugin and label of each random stream that has been drawn from.
-        has_chance: Whether anything after the births has drawn or read the seeds.
+        has_chance: Whether a plugin, or the order of moves, has drawn or read the seeds.
     """
 
     clock: Clock

@@ -9,7 +9,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from tussle.batch.quantities import column_name
-from tussle.batch.schemas import CHANCE, PLAYED_BY_CHANCE
+from tussle.batch.schemas import CHANCE
 
 FACTS = ("end", "t", "steps", "winner", "error", "state_hash", "cpu_s", "host")
 """Columns of the results that are the same in all rows of a run, in the order in which the table of runs has them."""
@@ -81,7 +81,7 @@ def with_values(
 def distinct_games(runs: pa.Table, failed: np.ndarray, quantities: Collection[np.ndarray] = ()) -> np.ndarray:
     """A number for each run, (n_runs,): one for all runs of a point where nothing in them depends on the seed, else its own.
 
-    These are copies of one game: births do not draw, no plugin of the batch does, and all end in the same state with the same results.
+    These are copies of one game: births do not draw, no plugin does, and all end in the same state with the same results.
     Games that draw are alike by chance, as those without a rare event are, or those in which nobody is left; each of them is an
     observation. Games that do not draw may still differ: a plugin may ask the world outside.
 
@@ -92,7 +92,7 @@ def distinct_games(runs: pa.Table, failed: np.ndarray, quantities: Collection[np
     """
     game, point = np.arange(len(failed)), runs["point"].to_numpy()
     chance = runs[CHANCE].to_numpy()
-    if failed.all() or (chance == PLAYED_BY_CHANCE).any():
+    if failed.all() or chance.all():
         return game
     text = pc.fill_null(runs["state_hash"].combine_chunks(), "").dictionary_encode()
     hashes = text.indices.to_numpy().astype(np.int64)

@@ -108,12 +108,14 @@ BATCH = Document(
 )
 """Schema of `batch.json`."""
 
-CHANCE, PLAYED_BY_CHANCE = "chance", 2
-"""A column of runs, and its value where plugins draw; it is 1 where births alone do, else 0."""
+GROUP, CHANCE = LATER = ("group", "chance")
+"""Columns of runs that former versions did not write: which points share a structure, and what depends on the seed."""
+PLAYED_BY_CHANCE = 2
+"""Value of `chance` where plugins draw; it is 1 where births alone do, else 0."""
 RUN = Bounds(0, MAX_RUNS - 1)
 RULES: Rules = {
     "run": RUN, "point": RUN, "seed": Bounds(0, 2**64 - 1), "team": Bounds(-(2**31), INT32, may_miss=True), "metric": TEXT,
     "end": TEXT, "t": NUMBER, "steps": COUNT, "state_hash": TEXT,
-    CHANCE: Bounds(0, PLAYED_BY_CHANCE), "cpu_s": Bounds(0.0), "host": TEXT, "alive": COUNT,
+    GROUP: RUN, CHANCE: Bounds(0, PLAYED_BY_CHANCE), "cpu_s": Bounds(0.0), "host": TEXT, "alive": COUNT,
 }  # fmt: skip
 """Bounds of the columns of a batch's tables."""

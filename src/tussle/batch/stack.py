@@ -248,7 +248,7 @@ class _Stack:
         return Finished(
             run.number, result.end, result.t, result.steps,
             None if result.error else result.winner, result.state_hash, "" if result.error is None else _reported(result.error),
-            self._cpu.total - float(self._cpu_begun[world]), self._host, metrics_of(result), alive, seen, self._chance_of(world),
+            self._cpu.total - float(self._cpu_begun[world]), self._host, metrics_of(result), alive, seen, run.group, self._chance_of(world),
         )  # fmt: skip
 
     def _chance_of(self, world: int) -> int:

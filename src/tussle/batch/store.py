@@ -17,7 +17,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from tussle.batch.consistency import check_design, check_metrics, check_results
-from tussle.batch.schemas import BATCH, CHANCE, PLAYED_BY_CHANCE, RULES
+from tussle.batch.schemas import BATCH, CHANCE, GROUP, LATER, PLAYED_BY_CHANCE, RULES
 from tussle.batch.tasks import Finished
 from tussle.documents import is_count, json_text
 from tussle.errors import BatchError, RecordError
@@ -47,6 +47,7 @@ PLAYED = pa.schema(
         ("steps", pa.int32()),
         ("winner", pa.int32()),
         ("state_hash", pa.string()),
+        (GROUP, pa.int32()),
         (CHANCE, pa.uint8()),
         ("error", pa.string()),
         ("cpu_s", pa.float64()),
@@ -60,7 +61,7 @@ PLAYED = pa.schema(
 IS_OWN = (BATCH_FILE, f"{BATCH_FILE}.part", LOCK)
 """Files that a directory may have before its batch has begun: a batch may have been killed then."""
 
-OF_RUN = ("end", "t", "steps", "winner", "state_hash", CHANCE, "error", "cpu_s", "host")
+OF_RUN = ("end", "t", "steps", "winner", "state_hash", GROUP, CHANCE, "error", "cpu_s", "host")
 
 RESULTS = pa.schema(
     [
@@ -334,9 +335,9 @@ def read_played(path: Path) -> tuple[pa.Table, list[str]]:
     """
     parts, notes = [PLAYED.empty_table()], list[str]()
     for file in sorted((path / PARTS).glob("*.arrow")):
-        batches = list(read_batches(file, [], BatchError, PLAYED, RULES, damage=notes, optional=[CHANCE]))
+        batches = list(read_batches(file, [], BatchError, PLAYED, RULES, damage=notes, optional=LATER))
         if batches:
-            parts.append(_with_chance(pa.Table.from_batches(batches), PLAYED).combine_chunks())
+            parts.append(_completed(pa.Table.from_batches(batches), PLAYED).combine_chunks())
     return pa.concat_tables(parts), notes
 
 
@@ -355,18 +356,18 @@ def read_table(path: Path, name: str, columns: pa.Schema, notes: list[str] | Non
     file = path / name
     if not file.exists():
         return None
-    table = _with_chance(read_parquet(file, columns, BatchError, notes=notes, optional=[CHANCE]), columns)
+    table = _completed(read_parquet(file, columns, BatchError, notes=notes, optional=LATER), columns)
     check_values(zip(table.column_names, table.columns, strict=True), RULES, file, BatchError)
     return table
 
 
-def _with_chance(table: pa.Table, columns: pa.Schema) -> pa.Table:
-    """A table of a batch. Older versions did not tell what depends on the seed: 0 is there, so that runs are copies if all end alike."""
-    if CHANCE not in columns.names or CHANCE in table.column_names:
-        return table
-    return table.add_column(
-        columns.get_field_index(CHANCE), columns.field(CHANCE), pa.array(np.zeros(table.num_rows, np.uint8))
-    )
+def _completed(table: pa.Table, columns: pa.Schema) -> pa.Table:
+    """A table of a batch, in which columns that a former version did not write are 0: its runs are copies if all of a point end alike."""
+    for name in LATER:
+        if name in columns.names and name not in table.column_names:
+            place, column = columns.get_field_index(name), columns.field(name)
+            table = table.add_column(place, column, pa.array(np.zeros(table.num_rows), column.type))
+    return table
 
 
 def finished_in(results: pa.Table) -> Iterator[Finished]:
@@ -462,12 +463,12 @@ def merged(path: Path, played: pa.Table, design: pa.Table, notes: list[str]) -> 
 
 
 def _with_one_chance(results: pa.Table) -> pa.Table:
-    """A table of results in which plugins of all runs draw if those of one do; whose stack that was, depends on how runs are played."""
-    if not pc.any(pc.equal(results[CHANCE], PLAYED_BY_CHANCE)).as_py():
-        return results
-    column = results.schema.get_field_index(CHANCE)
-    full = np.full(results.num_rows, PLAYED_BY_CHANCE, np.uint8)
-    return results.set_column(column, results.schema.field(column), pa.array(full))
+    """A table of results in which plugins of all runs of a group draw if those of one do: which were in one stack is not told."""
+    chance, group = (results[name].to_numpy() for name in (CHANCE, GROUP))
+    is_drawn = np.isin(group, np.unique(group[chance == PLAYED_BY_CHANCE]))
+    place = results.schema.get_field_index(CHANCE)
+    column = pa.array(np.where(is_drawn, np.uint8(PLAYED_BY_CHANCE), chance))
+    return results.set_column(place, results.schema.field(place), column)
 
 
 def _with_new(old: pa.Table | None, new: pa.Table, order: tuple[str, ...]) -> pa.Table:

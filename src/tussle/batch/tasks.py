@@ -52,6 +52,7 @@ class Finished:
         metrics: (team or None, name, value).
         alive: (team, t [s], entities) for each change of the number, from the start to the end.
         watched: What the package's watcher says of the game; None without one, and for a failed run.
+        group: That of the run.
         chance: What depends on the seed: 0 nothing, 1 the births, `PLAYED_BY_CHANCE` also the rest of some game of its stack.
     """
 
@@ -67,6 +68,7 @@ class Finished:
     metrics: list[tuple[int | None, str, float]]
     alive: list[tuple[int, float, int]]
     watched: Any = None
+    group: int = 0
     chance: int = 0
 
     @staticmethod
@@ -75,7 +77,9 @@ class Finished:
         named: list[int | None] = [int(team) for team in teams]
         # The tables have one row per metric, so a run without any would be missing.
         metrics = [(team, "alive", math.nan) for team in named or [None]]
-        return Finished(run.number, "error", 0.0, 0, None, "", error, 0.0, platform.node(), metrics, [])
+        return Finished(
+            run.number, "error", 0.0, 0, None, "", error, 0.0, platform.node(), metrics, [], group=run.group
+        )
 
 
 @dataclass(frozen=True)

@@ -136,8 +136,6 @@ def batch_of(options: BatchOptions) -> Batch:
         compat=options.compat,
         search=list(map(str, options.data_path)),
     )
-    if options.end is not None:
-        made.mission.ending_by_time()
     show_notes(made.loaded)
     return made
 

@@ -242,6 +242,7 @@ class LearnedFlight:
             return
         for name, value in self._constants.items():
             columns[name][due] = value
+        g.context.has_chance |= len(self.policies) > 1
         share = rng.uniform(g.context.seeds, self._draw, 0, 0)[0]
         which = (share * len(self.policies)).astype(int)[g.world[due]]
         obs, allowed = (each[due] for each in self.observe(simulation, g))

@@ -7,6 +7,7 @@ import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import is_dataclass
 from functools import cached_property
+from inspect import isfunction
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -57,7 +58,8 @@ class Task:
 
     Raises:
         ParameterError: An attribute is unknown, or a value is not allowed.
-        DeclarationError: A subclass has a name that differs by a letter from one of these, of `ends` or of `action_mask`.
+        DeclarationError: A subclass has a name that differs by a letter from one of these, of `ends` or of `action_mask`, and that its
+            methods do not use.
     """
 
     mission: ClassVar[Any] = None
@@ -81,7 +83,8 @@ class Task:
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
-        for name in vars(cls):
+        used = {k for each in vars(cls).values() if isfunction(each) for k in each.__code__.co_names}
+        for name in vars(cls).keys() - used:
             if meant := slip_of(name, (*_attributes(), "ends", "action_mask")):
                 raise DeclarationError(
                     f"{cls.__name__}.{name} is nothing that a task has, and is never used (did you mean {meant!r}?)"

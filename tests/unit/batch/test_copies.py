@@ -76,3 +76,9 @@ def test_an_event_that_happened_in_no_game_has_an_interval():
 def test_points_without_chance_are_copies_beside_others():
     vary = [Choice("A.variance", ("0 0 0", "9 9 0"))]
     assert Batch(mission(), vary=vary, runs=5).play(executor=InProcess()).n_distinct == 1 + 5
+
+
+def test_points_whose_plugins_do_not_draw_are_copies_beside_others_whose_do():
+    vary = [Choice("draws", (False, True))]
+    one = Batch(lambda draws: mission(autonomy=Draws()) if draws else mission(), vary=vary, runs=5)
+    assert one.play(executor=InProcess()).n_distinct == 1 + 5

@@ -300,7 +300,8 @@ def test_large_batches_are_tabled_without_a_loop_over_runs():
         "metric": pa.array([f"A.m{i}" for i in range(n_metrics)]).take(pa.array(np.tile(np.arange(n_metrics), n_runs))),
         "value": rng.random(len(run)), "end": pa.array(["time"] * 1).take(pa.array(np.zeros(len(run), int))),
         "t": np.ones(len(run)), "steps": np.ones(len(run), np.int32), "winner": pa.nulls(len(run), pa.int32()),
-        "state_hash": pa.nulls(len(run), pa.string()), "chance": np.zeros(len(run), np.uint8), "error": pa.nulls(len(run), pa.string()),
+        "state_hash": pa.nulls(len(run), pa.string()), "error": pa.nulls(len(run), pa.string()),
+        "group": np.zeros(len(run), np.int32), "chance": np.zeros(len(run), np.uint8),
         "cpu_s": np.ones(len(run)), "host": pa.nulls(len(run), pa.string()),
     }  # fmt: skip
     small = made_batch(scores(1))

@@ -83,9 +83,9 @@ def reference(mission, tmp_path):
 def as_before_chance_was_told(path):
     """Rewrite a batch directory as versions without the column `chance` have left it."""
     if (path / store.RESULTS_FILE).exists():
-        older = pq.read_table(path / store.RESULTS_FILE).drop_columns([store.CHANCE])
+        older = pq.read_table(path / store.RESULTS_FILE).drop_columns([*store.LATER])
         write_parquet(older, path / store.RESULTS_FILE)
-    schema = store.PLAYED.remove(store.PLAYED.get_field_index(store.CHANCE))
+    schema = pa.schema([column for column in store.PLAYED if column.name not in store.LATER])
     for part in list((path / store.PARTS).glob("*.arrow")):
         batches = list(read_batches(part, [], BatchError))
         part.unlink()
@@ -111,7 +111,7 @@ def test_directories_of_versions_that_did_not_tell_chance_are_read_and_gone_on_w
     assert found.n_distinct == wanted.n_distinct == 12
     results, *others = tables_of(path)
     wanted_results, *wanted_others = tables_of(reference)
-    assert results.drop_columns([store.CHANCE]) == wanted_results.drop_columns([store.CHANCE])
+    assert results.drop_columns([*store.LATER]) == wanted_results.drop_columns([*store.LATER])
     assert others == wanted_others
 
 

@@ -1,6 +1,7 @@
 """The tasks that come with tussle can be learned: who plays them by rule does better than who acts at random."""
 
 import re
+from typing import ClassVar
 
 import gymnasium
 import numpy as np
@@ -80,6 +81,19 @@ def test_what_a_task_would_never_use_is_refused_with_what_was_meant(name, value,
     ):
         type("Own", (Task,), {name: value})
     type("Own", (Task,), {meant: value, "bonus": 3.0, "reward_of": None, "_rewards": ()})
+
+
+def test_what_the_methods_of_a_task_use_may_have_any_name():
+    class Own(Task):
+        rewards: ClassVar = {"goal": 10.0}
+
+        def reward(self, now):
+            return self.rewards["goal"] * self.end(now)
+
+        def end(self, now):
+            return 1.0
+
+    assert Own.rewards
 
 
 @pytest.mark.parametrize(
