@@ -43,6 +43,8 @@ def test_damaged_directories_end_in_one_message_or_are_read(tmp_path):
     ]
     assert not faults, "\n\n".join(faults[:5])
     assert len({number for number, *_ in told}) == N
+    if N < 2000:
+        return  # Chance may leave a kind of damage out, or refuse all directories of a kind.
     damages = " ".join(damage for _, _, damage, *_ in told)
     assert [how for how in HOW if f" {how} " not in damages] == []
     assert {kind for _, kind, *_, said in told if said} == {kind for _, kind, *_, said in told if not said}
