@@ -20,7 +20,7 @@ from tussle.batch.variables import Range, Variable
 from tussle.cli.batch import answer_tables, short_names
 from tussle.cli.batch_options import AnalyzeOptions, ReportOptions
 from tussle.cli.operators import analyze_operators, is_folder_of_runs
-from tussle.cli.orders import analyze_orders, is_run
+from tussle.cli.orders import analyze_run, is_run
 from tussle.cli.progress import home_short
 from tussle.cli.tables import Cell, Row, indented, number_tables, title
 from tussle.cli.terminal import out, put, say_note
@@ -49,7 +49,7 @@ def report(options: ReportOptions) -> None:
 
 
 def analyze(options: AnalyzeOptions) -> None:
-    """Print the analysis of a batch, of the orders in a recorded run, or of the operators of several.
+    """Print the analysis of a batch, the result of a recorded run and the orders in it, or the operators of several.
 
     Raises:
         BatchError: The directory holds no batch.
@@ -72,7 +72,7 @@ def analyze(options: AnalyzeOptions) -> None:
         if are_several:
             analyze_operators(options.directories, options.quantities, options.as_json)
         else:
-            analyze_orders(directory, options.as_json)
+            analyze_run(directory, options.as_json)
         return
     compare = [options.compare] if options.compare else []
     results = load_batch(directory)

@@ -301,7 +301,7 @@ class StressOptions(ManyGamesOptions):
 
 @dataclass(frozen=True, kw_only=True)
 class AnalyzeOptions:
-    """Show who won a batch and how sure that is, how points differ, and which variables matter; of runs, who gave which orders."""
+    """Show who won a batch and how sure that is, how points differ, and which variables matter; of runs, their results and orders."""
 
     directories: Annotated[
         list[Path],

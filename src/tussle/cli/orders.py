@@ -1,10 +1,11 @@
-"""`tussle analyze RUN`: who gave which orders in a recorded game."""
+"""`tussle analyze RUN`: the result of a recorded game, and who gave which orders in it."""
 
 from __future__ import annotations
 
 import json
+import re
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -13,19 +14,26 @@ import typer
 from rich.console import RenderableType
 from rich.text import Text
 
+from tussle.cli.summary import game_facts, result_tables
 from tussle.cli.tables import Row, indented, number_tables, title
 from tussle.cli.terminal import put, say_note
 from tussle.declare.displays import counted
+from tussle.documents import Team
+from tussle.engine.result import WorldResult
 from tussle.errors import clipped
 from tussle.record.input_table import inputs_of
 from tussle.record.inputs import ExternalInput
 from tussle.record.run import Run, load_run
-from tussle.record.schema import RUN_FILE, TRAJECTORY_FILE
+from tussle.record.schema import RUN_FILE, SUMMARY_FILE, TRAJECTORY_FILE
 
 NOBODY = "(not said)"
 """Shown for inputs of which nobody said who gave them."""
 MAX_NAME_SHOWN = 40
 """Characters of a name in a table."""
+MAX_ERROR_SHOWN = 400
+"""Characters of the error that ended a world."""
+MAX_WORLDS = 4
+"""Worlds of a recording whose results are shown."""
 
 
 def is_run(directory: Path) -> bool:
@@ -89,8 +97,8 @@ def givers_of(run: Run, world: int | None = None) -> list[Giver]:
     return [found[by] for by in sorted(found)]
 
 
-def analyze_orders(directory: Path, as_json: bool) -> None:
-    """Print who gave which orders in a recorded game.
+def analyze_run(directory: Path, as_json: bool) -> None:
+    """Print the result of a recorded game, and who gave which orders in it.
 
     Args:
         directory: Directory of the run.
@@ -101,19 +109,57 @@ def analyze_orders(directory: Path, as_json: bool) -> None:
     """
     run = load_run(directory, is_mapped=True)
     givers, name = givers_of(run), str(run.info.get("mission", {}).get("name", "") or directory.name)
+    worlds = run.info.get("worlds", [])
     if as_json:
-        document = {"name": name, "path": str(directory), "orders": [giver.as_dict() for giver in givers]}
+        orders = [giver.as_dict() for giver in givers]
+        document = {"name": name, "path": str(directory), "worlds": worlds, "orders": orders}
         typer.echo(json.dumps(document, indent=1))
         return
     n = sum(giver.names.total() for giver in givers)
-    put(
-        "",
-        title(name, f"{counted(n, 'order')} from outside", str(directory)),
-        *(_tables(givers) if givers else ()),
-        "",
-    )
+    orders_given = [f"{counted(n, 'order')} from outside"] if n else []
+    put("", title(clipped(name), *orders_given, str(directory)))
+    mission = recorded_mission(run.info["mission"]) if worlds else {}
+    for world in worlds[:MAX_WORLDS]:
+        result = recorded_result(world)
+        head = f"world {result.world} · " if len(worlds) > 1 else ""
+        put(indented(head + game_facts(result, mission)))
+        error = clipped(" ".join((world["error"] or "").split()), MAX_ERROR_SHOWN)
+        put(*result_tables(result, mission, [("error", error), ("hash", shown_name(result.state_hash))]))
+    put(*(_tables(givers) if givers else ()), "")
+    if len(worlds) > MAX_WORLDS:
+        say_note(f"{counted(len(worlds) - MAX_WORLDS, 'more world')}: {directory / SUMMARY_FILE}")
     for note in run.notes:
         say_note(note)
+
+
+def recorded_mission(entry: Mapping[str, Any]) -> dict[str, Any]:
+    """The mission as `run.json` has it, with names that can be shown."""
+    return {**entry, "blocks": [{**block, "name": shown_name(block["name"])} for block in entry["blocks"]]}
+
+
+def recorded_result(world: Mapping[str, Any]) -> WorldResult:
+    """The result of a world as `run.json` has it, with those metrics that are a value or one for each team."""
+
+    def by_team(values: Mapping[str, Any]) -> dict[int, Any]:
+        return {int(team): float(n) if isinstance(n, str) else n for team, n in values.items()}
+
+    def shown(value: Any) -> Any:
+        return value if isinstance(value, (int, float)) else shown_name(str(value))
+
+    metrics: dict[str, dict[str, Any]] = {}
+    named = world.get("metrics")
+    for plugin, found in named.items() if isinstance(named, dict) else ():
+        for name, value in found.items() if isinstance(found, dict) else ():
+            if not isinstance(value, dict):
+                metrics.setdefault(shown_name(plugin), {})[shown_name(name)] = shown(value)
+            elif all(re.fullmatch(Team, team) for team in value):
+                metrics.setdefault(shown_name(plugin), {})[shown_name(name)] = {
+                    int(team): shown(one) for team, one in value.items()
+                }
+    return WorldResult(
+        world["world"], world["seed"], shown_name(world["end"]), world["steps"], world["t"], by_team(world["alive"]), metrics,
+        by_team(world["scores"]), world["state_hash"], born=by_team(world.get("born") or {}), waited=world.get("waited") or 0,
+    )  # fmt: skip
 
 
 def _tables(givers: Sequence[Giver]) -> Iterable[RenderableType]:

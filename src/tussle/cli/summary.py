@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from rich.console import RenderableType
 from rich.padding import Padding
 
 from tussle.cli.progress import times
 from tussle.cli.tables import fact_list, number_tables, title
 from tussle.cli.terminal import put
-from tussle.declare.displays import number
+from tussle.declare.displays import counted, number
 from tussle.engine.result import WorldResult
 from tussle.engine.simulation import Simulation
-from tussle.mission import Mission
 from tussle.record.event_texts import end_text
+from tussle.record.run_file import mission_entry
 
 
 class Speed:
@@ -53,55 +54,73 @@ class Speed:
 
 def show_summary(simulation: Simulation, name: str, speed: Speed, directory: Path | None) -> None:
     """Print the result of world 0 of a simulation."""
-    result, mission = simulation.result()[0], simulation.mission
-    n = sum(block.count for block in mission.blocks)
-    entities, steps = "entity" if n == 1 else "entities", "step" if result.steps == 1 else "steps"
-    facts = f"seed {result.seed} · {n} {entities} · {result.steps} {steps} of {mission.dt:g} s"
-    networks = [network.instance_name for network in mission.networks]
+    result, mission = simulation.result()[0], mission_entry(simulation.mission)
+    facts = [
+        ("speed", str(speed)),
+        ("grade", simulation.grade),
+        ("hash", result.state_hash),
+        ("run", str(directory) if directory is not None else "not recorded (--no-log)"),
+    ]
+    head = title(mission["name"] or name, game_facts(result, mission))
+    put("", head, *result_tables(result, mission, facts), "")
+
+
+def game_facts(result: WorldResult, mission: Mapping[str, Any]) -> str:
+    """Seed, entities and steps of a game on one line. The mission is as `run.json` has it."""
+    n = sum(block["count"] or 0 for block in mission["blocks"])
+    entities = "1 entity" if n == 1 else f"{n} entities"
+    return f"seed {result.seed} · {entities} · {counted(result.steps, 'step')} of {mission['dt']:g} s"
+
+
+def result_tables(
+    result: WorldResult, mission: Mapping[str, Any], facts: Sequence[tuple[str, str]]
+) -> Iterator[RenderableType]:
+    """Yield the result of a world: teams, networks that lose messages, and why it ended, with further facts.
+
+    Args:
+        result: The result.
+        mission: The mission as `run.json` has it.
+        facts: Names and values that stand at the end of the list of facts.
+    """
+    networks = mission.get("networks") or ()
     of_world = (
         (plugin, f"{key} {_number(value)}")
         for plugin, named in result.metrics.items()
         for key, value in named.items()
         if not isinstance(value, dict) and plugin not in networks
     )
-    put(
-        "",
-        title(mission.name or name, facts),
-        *team_tables(result, mission),
-        *network_tables(result, networks),
-        fact_list(
-            [
-                ("ended", f"{end_text(result.end)}, at t = {result.t:g} s"),
-                *([("births", f"{result.waited} waited for a free position")] if result.waited else []),
-                *of_world,
-                ("speed", str(speed)),
-                ("grade", simulation.grade),
-                ("hash", result.state_hash),
-                ("run", str(directory) if directory is not None else "not recorded (--no-log)"),
-            ]
-        ),
-        "",
-    )
+    waited = [("births", f"{result.waited} waited for a free position")] if result.waited else []
+    ended = ("ended", f"{end_text(result.end)}, at t = {result.t:g} s")
+    yield from team_tables(result, mission["blocks"])
+    yield from network_tables(result, networks)
+    yield fact_list([ended, *waited, *of_world, *facts])
 
 
-def team_tables(result: WorldResult, mission: Mission) -> list[Padding]:
-    """Return tables of the teams: names, number of entities that were born and of those left, metrics, score."""
+def team_tables(result: WorldResult, blocks: Sequence[Mapping[str, Any]]) -> list[Padding]:
+    """Return tables of the teams: names, number of entities that were born and of those left, metrics, score.
+
+    Args:
+        result: The result; of recordings by former versions it does not know the births, and the table does without.
+        blocks: Blocks of the mission as `run.json` has them.
+    """
     columns, has_scores = list(_team_columns(result)), bool(result.scores)
-    planned = {team: sum(b.count for b in mission.blocks if b.team == team) for team in result.alive}
-    comes_later = any(b.rate for b in mission.blocks) or result.born != planned
+    planned = {team: sum(b["count"] or 0 for b in blocks if b["team"] == team) for team in result.alive}
+    comes_later = any(b.get("rate") for b in blocks) or result.born != planned
     head = [
         "team",
-        "born" if comes_later else "start",
+        *(["born" if comes_later else "start"] if result.born else []),
         "left",
         *(name for name, _ in columns),
         *(["score", ""] if has_scores else []),
     ]
     rows = []
     for team in sorted(result.alive):
-        blocks = [b for b in mission.blocks if b.team == team]
-        names = ", ".join(dict.fromkeys(b.name for b in blocks))
-        born, of = result.born[team], planned[team]
-        cells = [f"{team} {names}", f"{born} of {of}" if born < of else str(born), str(result.alive[team])]
+        names = ", ".join(dict.fromkeys(b["name"] for b in blocks if b["team"] == team))
+        cells = [f"{team} {names}"]
+        if result.born:
+            born, of = result.born.get(team, 0), planned[team]
+            cells.append(f"{born} of {of}" if born < of else str(born))
+        cells.append(str(result.alive[team]))
         cells += [_number(values.get(team, "")) for _, values in columns]
         if has_scores:
             cells += [_number(result.scores.get(team, 0.0)), "won" if team == result.winner else ""]

@@ -132,9 +132,16 @@ def mission_entry(mission: Any) -> dict[str, Any]:
     names = ("name", "dt", "start", "end", "motion_multiplier", "update", "end_conditions")
     return {name: getattr(mission, name) for name in names} | {
         "blocks": [
-            {"name": b.name, "team": b.team, "count": b.count, "plugins": [repr(p) for p in b.plugins]}
+            {
+                "name": b.name,
+                "team": b.team,
+                "count": b.count,
+                "rate": b.rate,
+                "plugins": [repr(p) for p in b.plugins],
+            }
             for b in mission.blocks
         ],
+        "networks": [network.instance_name for network in mission.networks],
         "world_plugins": [repr(p) for p in mission.world_plugins],
     }
 
@@ -147,6 +154,8 @@ def _world(result: Any) -> dict[str, Any]:
         "steps": result.steps,
         "t": result.t,
         "alive": result.alive,
+        "born": result.born,
+        "waited": result.waited,
         "scores": result.scores,
         "winner": result.winner,
         "metrics": result.metrics,

@@ -170,6 +170,8 @@ _WORLD = {
     "steps": Whole(),
     "t": Real(),
     "alive": _TEAMS,
+    "born": Maybe(Map(Whole(), Team)),
+    "waited": Maybe(Whole()),
     "scores": _TEAMS,
     "winner": Maybe(Whole(-(2**31))),
     "state_hash": str,
@@ -190,8 +192,15 @@ RUN = Document(
             "end": Maybe(Real(is_any=True)),
             "end_conditions": Maybe([str]),
             "blocks": [
-                {"name": str, "team": Whole(-(2**31), 2**31 - 1), "count": Maybe(Whole()), "plugins": [str]}
+                {
+                    "name": str,
+                    "team": Whole(-(2**31), 2**31 - 1),
+                    "count": Maybe(Whole()),
+                    "rate": Maybe(Real(is_any=True)),
+                    "plugins": [str],
+                }
             ],
+            "networks": Maybe([str]),
             "world_plugins": Maybe([str]),
         },
         "worlds": [_WORLD],

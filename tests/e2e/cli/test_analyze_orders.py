@@ -47,9 +47,46 @@ def test_json(tussle, steered):
 def test_a_run_without_orders_and_options_of_batches(tussle, folder, steered):
     with Simulation(Mission(blocks=[], end=1.0), 1) as sim, Recorder(sim, folder / "quiet"):
         sim.run()
-    assert "0 orders from outside" in tussle("analyze", folder / "quiet").stdout
+    said = tussle("analyze", folder / "quiet").stdout
+    assert "from outside" not in said
+    assert "end time reached, at t = 1 s" in said
     refused = tussle("analyze", steered, "--by-point", code=1)
     assert "is a recorded run, and --by-point is for batches" in " ".join(refused.stderr.split())
+
+
+def test_the_result_is_what_the_command_printed_that_played_the_game(tussle, folder):
+    """Also of missions with births, networks that lose messages, and metrics of the whole world."""
+    for mission in ("predator_prey", "convoy", "boundary_defense"):
+        words = ("run", mission, "--end", "40", "--out", folder / mission)
+        played = tussle(*words).stdout.splitlines()
+        told = tussle("analyze", folder / mission).stdout.splitlines()
+        own = ("speed", "grade", "run")
+        kept = [line.split() for line in played if line.split() and line.split()[0] not in own]
+        assert [line for line in map(str.split, told) if line and str(folder / mission) not in line] == kept
+
+
+def test_recordings_of_former_versions_and_of_others(tussle, folder):
+    """Births were not written, and names and metrics may be anything."""
+    robots = [
+        Block(name=name, team=i, count=2, autonomy=Boids(), motion=SingleIntegrator())
+        for i, name in enumerate(("[b]a", "b" * 99))
+    ]
+    with Simulation(Mission(blocks=robots, end=1.0), range(6)) as sim, Recorder(sim, folder / "odd"):
+        sim.run()
+    file = folder / "odd" / "run.json"
+    info = json.loads(file.read_text())
+    del info["checksum"]
+    for world in info["worlds"]:
+        del world["born"], world["waited"]
+        world["metrics"] = {"\x1b[2J": {"a\nb": {"0": "nan", "1": None}, "c": "inf", "d": {"x": 1}}, "e": 3}
+        world["error"] = "it failed\n" * 999
+    file.write_text(json.dumps(info))
+    told = tussle("analyze", folder / "odd")
+    lines = [line.split() for line in told.stdout.splitlines()]
+    assert lines.count(["0", "[b]a", "2", "nan"]) == 4
+    assert "start" not in told.stdout
+    assert "\x1b" not in told.stdout
+    assert "2 more worlds" in told.stderr
 
 
 def test_names_in_a_recording_of_others_are_shown_on_one_line(tussle, folder):
