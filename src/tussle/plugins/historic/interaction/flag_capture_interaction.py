@@ -16,8 +16,8 @@ class FlagCaptureInteraction(flag_capture_interaction.FlagCaptureInteraction):
     step on. Only those that are inside at the end of a step enter.
     """
 
-    def _enters(self, w: WorldView, shape: Volume) -> np.ndarray:
-        return shape.contains(w.pos)
+    def _enters(self, w: WorldView, shape: Volume, may: np.ndarray) -> np.ndarray:
+        return np.asarray(may & shape.contains(w.pos))
 
     def _takers(self, w: WorldView, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         rows = rows[w.step_count[w.world[rows]] > 0]

@@ -92,8 +92,8 @@ class Boundary(Interaction):
         return (TeamRegion(self.boundary_id, self.team, center, shape),)
 
     def step(self, w: WorldView) -> None:
-        fresh = np.flatnonzero(~self.is_told & (np.bincount(w.world, minlength=w.n_worlds) > 0))
-        if len(fresh):
+        if not self.is_told.all():
+            fresh = np.flatnonzero(~self.is_told & (np.bincount(w.world, minlength=w.n_worlds) > 0))
             w.publish(BoundaryShape, fresh, boundary=self.boundary_id, team=self.team, shape=self.region())
             self.is_told[fresh] = True
         inside = self.region().contains(w.pos)

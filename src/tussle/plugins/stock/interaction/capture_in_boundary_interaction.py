@@ -44,7 +44,10 @@ class CaptureInBoundaryInteraction(Interaction):
         region = w.region(self.boundary_id)
         is_inside = self._is_inside(w, region.shape)
         now = w.t[w.world] + 1e-6 * w.dt
-        defends = is_inside & (w.team == region.team) & (now >= self.ready_at)
+        has_intruders = np.bincount(w.world[is_inside & (w.team != region.team)], minlength=w.n_worlds) > 0
+        defends = is_inside & (w.team == region.team) & (now >= self.ready_at) & has_intruders[w.world]
+        if not defends.any():
+            return
         row, other, distance = self._near(w, np.where(defends, self.capture_range[w.world], 0.0))
         order = np.lexsort((w.id[row], distance))
         order = order[is_inside[other[order]]]

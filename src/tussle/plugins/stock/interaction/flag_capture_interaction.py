@@ -38,19 +38,19 @@ class FlagCaptureInteraction(Interaction):
         flag, home = w.region(self.flag_boundary_id), w.region(self.capture_boundary_id)
         self.carrier[w.rows_at(np.arange(w.n_worlds), self.carrier) < 0] = 0
         is_free = (self.carrier == 0) & ~self.is_captured
-        rows = np.flatnonzero(is_free[w.world] & (w.team != flag.team) & self._enters(w, flag.shape))
+        rows = np.flatnonzero(self._enters(w, flag.shape, is_free[w.world] & (w.team != flag.team)))
         if len(rows):
             carriers, takers = self._takers(w, rows)
             self.carrier[w.world[carriers]] = w.id[carriers]
             self._publish(w, FlagTaken, takers)
         carries = (self.carrier[w.world] == w.id) & ~self.is_captured[w.world]
-        rows = np.flatnonzero(carries & self._enters(w, home.shape))
+        rows = np.flatnonzero(self._enters(w, home.shape, carries))
         self.is_captured[w.world[rows]] = True
         self._publish(w, FlagCaptured, rows)
 
-    def _enters(self, w: WorldView, shape: Volume) -> np.ndarray:
-        """Return which entities were in a region during the step, (n,)."""
-        return shape.crossed(w.start_pos, w.pos)
+    def _enters(self, w: WorldView, shape: Volume, may: np.ndarray) -> np.ndarray:
+        """Return which of the entities that `may`, (n,), were in a region during the step, (n,)."""
+        return shape.crossed(w.start_pos, w.pos, may)
 
     def _takers(self, w: WorldView, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return, of the entering rows, (m,), those that get the flag, and those for which `FlagTaken` is published."""
