@@ -21,7 +21,7 @@ OWN_READERS = {
     "src/tussle/numeric/store.py": "files of the package",
     "src/tussle/view/page/assemble.py": "files of the package",
     "src/tussle/batch/report/__init__.py": "files of the package",
-    "src/tussle/batch/dask_worker.py": "files of the package",
+    "src/tussle/batch/code.py": "files of the package",
     "src/tussle/plugins/links/ros/domain.py": "a file of the system",
     "src/tussle/batch/slurm.py": "the log of a job of one's own",
     "src/tussle/batch/batch.py": "mission files that were read before",

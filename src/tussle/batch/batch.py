@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tussle.arguments import checked, explained
+from tussle.batch.code import plugin_code
 from tussle.batch.design_points import (
     DesignPoint,
     build_points,
@@ -288,6 +289,11 @@ class Batch:
         return [point for point in points if point not in late]
 
     @cached_property
+    def code(self) -> dict[str, str]:
+        """Hashes of the code of plugin classes that neither tussle nor a plugin file has."""
+        return plugin_code(self.missions)
+
+    @cached_property
     def fingerprint(self) -> str:
         """Hash of all that the runs depend on, without their number."""
         if self.loaded is None:
@@ -303,6 +309,7 @@ class Batch:
             *(text for file in self.plugin_files for text in file.texts.values()),
             json.dumps([self._settings(p) for p in self.plan.points], default=str),
             repr((self.plan.first_seed, self.plan.independent, self._ends_by_time, versions()["tussle"])),
+            *(f"{name} {text}" for name, text in self.code.items()),
         ]
         return hashlib.blake2b("\0".join(parts).encode(), digest_size=16).hexdigest()
 
@@ -353,6 +360,7 @@ class Batch:
             "tussle": versions()["tussle"],
             "name": mission.name or self.name,
             "fingerprint": self.fingerprint,
+            "code": self.code,
             "mission": {"made_in": "python"}
             if self.loaded is None
             else {

@@ -8,6 +8,7 @@ import pickle
 from collections.abc import Callable
 from types import CodeType, FunctionType
 from typing import Any
+from weakref import WeakSet
 
 from tussle.api.laws import NeighborLaw
 from tussle.numeric.kernel import Device, Kernel
@@ -68,10 +69,26 @@ def _dump(value: Any, stream: io.BytesIO) -> dict[str, list[str]]:
                 return type(obj), (obj.py_func,)
             if isinstance(obj, CodeType):  # whose file name cloudpickle 3.1.3 leaves out
                 return _code_of, (obj.co_filename, *self.dispatch_table[CodeType](obj))
-            return super().reducer_override(obj)
+            made = super().reducer_override(obj)
+            if isinstance(obj, type) and isinstance(made, tuple) and len(made) == 6:  # a class by value
+                _AT_HOME.add(obj)
+                make, arguments, state, items, pairs, fill = made
+                return make, arguments, (fill, state), items, pairs, _fill
+            return made
 
     Pickler(stream).dump(value)
     return {file: linecache.getlines(file) for file in files}
+
+
+_AT_HOME: WeakSet[type] = WeakSet()
+"""Classes that were pickled in this process. To unpickle one here gives the class itself."""
+
+
+def _fill(cls: type, given: tuple[Callable[[type, Any], object], Any]) -> None:
+    """Give a class its attributes, unless it is at home: its methods would then have copies of their globals, which stay as they are."""
+    fill, state = given
+    if cls not in _AT_HOME:
+        fill(cls, state)
 
 
 def _code_of(file: str, make: Callable[..., CodeType], values: tuple[Any, ...]) -> CodeType:

@@ -13,7 +13,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from tussle.arguments import explained
-from tussle.batch.dask_worker import code_of, play_chunk
+from tussle.batch.code import code_of
+from tussle.batch.dask_worker import play_chunk
 from tussle.batch.executors import RunQueue, even_size
 from tussle.batch.stack import stack_size
 from tussle.batch.tasks import BatchRun, Finished, Heartbeat, Package

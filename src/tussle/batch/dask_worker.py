@@ -2,25 +2,16 @@
 
 from __future__ import annotations
 
-import hashlib
-import platform
 import threading
 import time
 from collections.abc import Mapping, Sequence
 from contextlib import closing
-from functools import cache
-from importlib import import_module
-from pathlib import Path
 
+from tussle.batch.code import SOURCE, code_here
 from tussle.batch.stack import play
 from tussle.batch.tasks import BatchRun, Finished, Package
 from tussle.errors import BatchError
-from tussle.mission import Mission
-from tussle.mission.plugin_files import PREFIX
-from tussle.record.run_file import versions
 
-SOURCE = "source of "
-"""Begins the names of hashes in `code_of`."""
 REPORT_PERIOD = 1.0  # [s]; hundreds of workers report to one scheduler
 
 _playing = threading.Lock()
@@ -69,36 +60,6 @@ def play_chunk(
     return finished
 
 
-def code_of(mission: Mission) -> dict[str, str]:
-    """Return the facts on which results depend: versions, and hashes of the source of tussle and of packages with plugins.
-
-    Plugin files and scripts are left out: they are sent with the mission.
-    """
-    plugins = [*mission.world_plugins, *(p for block in mission.blocks for p in block.plugins)]
-    packages = {type(plugin).__module__.split(".")[0] for plugin in plugins} - {"__main__"}
-    return _code(tuple(sorted({"tussle", *(name for name in packages if not name.startswith(PREFIX))})))
-
-
-@cache
-def _code(packages: tuple[str, ...]) -> dict[str, str]:
-    found = {name: versions()[name] for name in ("tussle", "numpy", "numba")}
-    found["python"] = ".".join(platform.python_version_tuple()[:2])
-    return found | {f"{SOURCE}{name}": _source(name) for name in packages}
-
-
-def _source(name: str) -> str:
-    """Hash of the code of a package: its version changes only with a release."""
-    module = import_module(name)
-    folders = [Path(folder) for folder in getattr(module, "__path__", ())]
-    file = getattr(module, "__file__", None)
-    files = [(path, folder) for folder in folders for path in folder.rglob("*.py")]
-    files += [(Path(file), Path(file).parent)] if file and not folders else []
-    digest = hashlib.blake2b(digest_size=8)
-    for path, folder in sorted(files):
-        digest.update(str(path.relative_to(folder)).encode() + b"\0" + path.read_bytes())
-    return digest.hexdigest()
-
-
 def check_same_code(wanted: Mapping[str, str], worker: str) -> None:
     """Compare the code of this process, which is a worker, with that of the process that runs the batch.
 
@@ -110,7 +71,7 @@ def check_same_code(wanted: Mapping[str, str], worker: str) -> None:
         BatchError: They differ.
         ImportError: A package is missing here.
     """
-    own = _code(tuple(name.removeprefix(SOURCE) for name in wanted if name.startswith(SOURCE)))
+    own = code_here(name.removeprefix(SOURCE) for name in wanted if name.startswith(SOURCE))
     differing = [name for name in wanted if own.get(name) != wanted[name]]
     if differing:
         there, here = (", ".join(f"{name} {v[name]}" for name in differing) for v in (own, wanted))

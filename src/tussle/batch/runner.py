@@ -294,6 +294,9 @@ def _check_same(batch: Playable, path: Path, before: dict[str, Any]) -> None:
         for name in IDENTITY
         if before.get(name) != now.get(name)
     ]
+    then, code = before.get("code") or {}, now["code"]
+    if changed := [name for name in (then | code) if then.get(name) != code.get(name)]:
+        differing.append(f"the code of {', '.join(changed)}, which has changed since")
     what = (
         f"it differs in {', '.join(differing)}"
         if differing

@@ -87,6 +87,7 @@ BATCH = Document(
             "colours": Maybe(Map(Colour, Team)),
             "n_seeds_kept": Maybe(Whole()),
             "fingerprint": Maybe(str),
+            "code": Maybe(Map(str)),
             "tussle": str,
             "sample": str,
             "sample_seed": Whole(0, 10**80),

@@ -33,6 +33,7 @@ from tussle.engine.snapshot import Snapshot, restore, snapshot, state_hash
 from tussle.engine.state import SimulationState
 from tussle.engine.step_end import remove_dead, world_result
 from tussle.engine.stiffness import check_stiffness
+from tussle.engine.whole_steps import WholeSteps
 from tussle.errors import MissionError, ParameterError, PluginError, SnapshotError
 from tussle.mission import GivenMission, Mission, mission_of
 from tussle.mission.rekeys import Rekeys
@@ -96,6 +97,7 @@ class Simulation:
         self.observers: list[Callable[[Simulation], None]] = []
         self._inputs: dict[int, dict[int, list[ExternalInput]]] = {}
         self.is_closed = False
+        self._whole_steps = WholeSteps()
         self._resumed = threading.Event()
         self._resumed.set()
         self.state = SimulationState(mission, numbers, params or {}, threads, on_error, start_from)
@@ -167,9 +169,10 @@ class Simulation:
 
     def _step(self) -> None:
         state = self.state
-        if self._inputs:
-            self._play_inputs()
+        self._whole_steps.begin()
         try:
+            if self._inputs:
+                self._play_inputs()
             renew_keys(state)
             if state.births.has_rates or state.world_view.births:
                 spawn_due(state)
@@ -183,7 +186,13 @@ class Simulation:
         except PluginError as error:
             self._stop(error)
         except SystemExit as end:
+            self._whole_steps.cut(np.flatnonzero(state.running).tolist())
             raise failure.leaving(end, int(self.steps.max())) from None
+        except KeyboardInterrupt:
+            self._whole_steps.cut(np.flatnonzero(state.running).tolist())
+            raise
+        finally:
+            self._whole_steps.end()
 
     def _stop(self, error: PluginError) -> None:
         """End the stack after an exception: record or raise the error."""
@@ -209,21 +218,24 @@ class Simulation:
         """
         check_argument("until", until, Maybe(Real(-math.inf, math.inf)))
         state, end = self.state, self.mission.end if until is None else until
-        with notebook_bar(self.mission.name) as show:
+        with notebook_bar(self.mission.name) as show, self._whole_steps.interruptible() as check_interrupt:
             while state.n_running:
                 if until is not None and float(self.t[state.running].min()) >= until - 1e-6 * self.mission.dt:
                     break
                 self._resumed.wait()
                 self._step()
+                check_interrupt()
                 if show is not None:
                     show(float(self.t.max()), end, "s")
         return self.result()
 
     def run_until(self, condition: Callable[[Simulation], bool]) -> None:
         """Step until condition(self) is true or all worlds have ended. Waits while paused."""
-        while self.state.n_running and not condition(self):
-            self._resumed.wait()
-            self._step()
+        with self._whole_steps.interruptible() as check_interrupt:
+            while self.state.n_running and not condition(self):
+                self._resumed.wait()
+                self._step()
+                check_interrupt()
 
     def pause(self) -> None:
         """Make `run` and `run_until` wait before the next step. `step` is not affected."""
@@ -269,6 +281,7 @@ class Simulation:
             raise ParameterError(f"reset: rekeys of {len(rekeys)} for {len(numbers)} worlds")
         set_rekeys(self.state, numbers, rekeys)
         reset(self.state, numbers, seeds, params)
+        self._whole_steps.renew(numbers)
 
     # -- access between steps -----------------------------------------------------------------------------------------------------------
 
@@ -430,6 +443,7 @@ class Simulation:
             SnapshotError: The snapshot has another mission or number of worlds, or blocks that this simulation has no group for.
         """
         restore(self.state, snapshot)
+        self._whole_steps.renew(range(self.n_worlds))
 
     def result(self, *, is_hashed: bool = True) -> list[WorldResult]:
         """Result of each world; of running worlds, the result so far.

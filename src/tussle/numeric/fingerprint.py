@@ -91,7 +91,7 @@ class Fingerprint:
             return
         code = function.__code__
         self._write("function", code_text(code, function.__doc__))
-        if lines := lines_of_errors(code, package(function)):
+        if lines := self._lines(code, package(function)):
             self._write("lines", lines)
         self._visit(function.__defaults__, frozenset())
         self._write(repr(sorted(function.__kwdefaults__ or ())))
@@ -110,6 +110,10 @@ class Fingerprint:
         for implementation in overloads_of(function):
             self._write("overload")
             self._visit(implementation, frozenset())
+
+    def _lines(self, code: types.CodeType, owner: str) -> str:
+        """Lines that the machine code of a function holds."""
+        return lines_of_errors(code, owner)
 
     def _visit_module(self, module: types.ModuleType, names: frozenset[str]) -> None:
         # Visits every name of the function that is an attribute of the module, even if the function reads it elsewhere. This may

@@ -45,11 +45,12 @@ class Timings:
 
 def versions() -> dict[str, str]:
     """Versions of Python and of the packages that a result may depend on."""
-    return {"python": platform.python_version()} | {name: _version(name) for name in PACKAGES}
+    return {"python": platform.python_version()} | {name: version(name) for name in PACKAGES}
 
 
 @cache
-def _version(name: str) -> str:
+def version(name: str) -> str:
+    """Version of a package, "unknown" without one."""
     try:
         return metadata.version(name)
     except metadata.PackageNotFoundError:  # run from a source tree that was never installed

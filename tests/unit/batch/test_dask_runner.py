@@ -18,8 +18,9 @@ import pytest
 
 import tussle
 from tussle.batch import Batch, InProcess
+from tussle.batch.code import code_of
 from tussle.batch.dask_runner import OnDask, _Playing, connect
-from tussle.batch.dask_worker import check_same_code, code_of
+from tussle.batch.dask_worker import check_same_code
 from tussle.batch.slurm import executor_for
 from tussle.batch.tasks import Finished, Heartbeat
 from tussle.errors import BatchError, MissingExtraError, ParameterError

@@ -12,7 +12,7 @@ from recorded_games import hunt, record
 from tussle.errors import ParameterError, RecordError, ViewError
 from tussle.record import load_run
 from tussle.record.schema import TRAJECTORY, TRAJECTORY_FILE
-from tussle.view.export.tables import write_tables
+from tussle.view.export.tables import _texts, write_tables
 
 
 @pytest.fixture(scope="module")
@@ -46,6 +46,49 @@ def test_both_tables_are_there_to_the_last_bit(played, tmp_path, kind):
     assert report.notes == []
     assert_same(read(states), run.trajectory_table)
     assert_same(read(events), run.events_table)
+
+
+def test_readers_that_guess_types_from_the_first_rows_find_those_of_the_recording(played, tmp_path):
+    polars = pytest.importorskip("polars")
+    write_tables(played, tmp_path / "a.csv", "csv")
+    for path, table in (
+        ("a.csv", load_run(played).trajectory_table),
+        ("a.events.csv", load_run(played).events_table),
+    ):
+        frame = polars.read_csv(tmp_path / path, infer_schema_length=1)
+        real = [name for name in table.column_names if pa.types.is_floating(table[name].type)]
+        assert real == [name for name in frame.columns if frame[name].dtype.is_float()]
+        assert_same(frame.to_arrow(), table)
+
+
+REAL = [
+    0.0,
+    -0.0,
+    1.0,
+    -3.0,
+    0.1,
+    1e14,
+    1e15,
+    1e16,
+    -1e15,
+    123456789.0,
+    2.0**53,
+    5e-324,
+    1.7e308,
+    1e22,
+    np.inf,
+    -np.inf,
+    None,
+]
+
+
+@pytest.mark.parametrize("numbers", [REAL, REAL[:4], [0.5], [None], [np.nan, 1.0]])
+def test_texts_of_real_numbers_are_these_numbers_and_look_real(numbers):
+    texts = _texts(pa.chunked_array([pa.array(numbers, pa.float64())])).to_pylist()
+    assert [text and repr(float(text)) for text in texts] == [
+        x if x is None else repr(float(x)) for x in numbers
+    ]
+    assert all(text is None or set(text) & set(".en") for text in texts)
 
 
 @pytest.mark.parametrize("kind", ["csv", "parquet"])
