@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from rich.padding import Padding
+from rich.text import Text
 
 from tussle.cli.progress import times
 from tussle.cli.tables import fact_list, number_tables, title
@@ -77,7 +78,7 @@ def show_summary(simulation: Simulation, name: str, speed: Speed, directory: Pat
                 ("speed", str(speed)),
                 ("grade", simulation.grade),
                 ("hash", result.state_hash),
-                ("run", str(directory) if directory is not None else "not recorded (--no-log)"),
+                ("run", Text(str(directory)) if directory is not None else "not recorded (--no-log)"),
             ]
         ),
         "",
