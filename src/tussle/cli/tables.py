@@ -100,7 +100,7 @@ def fact_list(facts: Iterable[tuple[str, Cell]]) -> Text:
     made = Text(no_wrap=True)
     for name, value in shown:
         room = max(out().width - indent - 1, 8)
-        lines: Sequence[Cell] = value.split("\n") if isinstance(value, Text) else _wrapped(value, room)
+        lines: Sequence[Cell] = list(value.split("\n")) if isinstance(value, Text) else _wrapped(value, room)
         for i, line in enumerate(lines):
             label = "" if i else name
             made.append("\n " + label, "dim").append(" " * (indent - cell_len(label))).append(line)
