@@ -3,7 +3,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { Camera, pixelOf, placeBehind, STEEPEST } from '../../src/tussle/view/page/web/camera.js';
-import { decimalsOf, eventText, length, number, times } from '../../src/tussle/view/page/web/formatting.js';
+import { decimalsOf, duration, eventText, length, number, times } from '../../src/tussle/view/page/web/formatting.js';
 import { forward, halfTurn, minus, norm, rotated, turned, unit } from '../../src/tussle/view/page/web/geometry.js';
 import { geodeticOf, sidesOf } from '../../src/tussle/view/page/web/geodesy.js';
 import { coarse, prepared } from '../../src/tussle/view/page/web/models.js';
@@ -168,7 +168,13 @@ test('numbers, lengths and times as text', () => {
   assert.deepEqual([number(1234567), number(-0.04, 1), number(-2.5, 1)], ['1,234,567', '0.0', '−2.5']);
   assert.deepEqual([1500, 2, 0.05, 0.002, 0.0005].map(length), ['1.5 km', '2 m', '5 cm', '2.0 mm', '0.50 mm']);
   assert.deepEqual([times(0.5), times(Infinity)], ['0.5×', 'max']);
-  assert.deepEqual([0.1, 0.04, 1, 1e-9].map(decimalsOf), [1, 2, 1, 4]);
+  assert.deepEqual([0.1, 0.04, 1, 1e-9].map(decimalsOf), [1, 2, 1, 9]);
+  for (let digits = 1; digits < 10; digits++) {
+    const step = 10 ** -digits;
+    assert.notEqual((3 * step).toFixed(decimalsOf(step)), (2 * step).toFixed(decimalsOf(step)), `steps of ${step} s are told apart`);
+    assert.equal(Number.parseFloat(duration(20 * step).replace('−', '-')), Number((20 * step).toPrecision(4)), duration(20 * step));
+  }
+  assert.deepEqual([100000, 500.5, 0.1 + 0.2, 0].map(duration), ['100,000 s', '500.5 s', '0.3 s', '0 s']);
 });
 
 test('events as sentences', () => {

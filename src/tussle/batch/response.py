@@ -217,13 +217,14 @@ def fitted(
 
 def _as_number(means: PointMeans, n: np.ndarray) -> Observed:
     centre = float(means.mean.mean())
-    scale = float(means.mean.std()) or 1.0
     is_known = bool(np.isfinite(means.variance).all())
+    spread = float(means.mean.std()) or (math.sqrt(float(means.variance.mean())) if is_known else 0.0)
+    scale = spread or 1.0  # of runs that are all equal, the fit is a line without a band, in whatever unit
     least = 1e-6 * scale**2
     variance = np.maximum(means.variance, least) if is_known else np.full(len(means.mean), least)
     noise = float((means.variance * n).mean() + means.common * n.mean()) / scale**2 if is_known else None
     return Observed(
-        (means.mean - centre) / scale, scale**2 / variance, means.common / scale**2, centre, scale, False, noise
+        (means.mean - centre) / scale, scale**2 / variance, means.common / scale**2, centre, spread, False, noise
     )  # fmt: skip
 
 
@@ -309,7 +310,7 @@ class Response:
         mean, covariance = self._joint(rows)
         value, slope = self._outward(mean)
         weight = np.repeat([-1.0, 1.0], len(first)) / len(first)
-        found = float(weight @ value)
+        found = float(value[len(first) :].mean() - value[: len(first)].mean())  # exactly 0 of a constant
         half = _QUANTILE * math.sqrt(max(float((weight * slope) @ covariance @ (weight * slope)), 0.0))
         low, high = found - half, found + half
         return (found, max(low, -1.0), min(high, 1.0)) if self.is_share else (found, low, high)

@@ -294,7 +294,7 @@ def show_batch(results: Results, directory: Path, wall: float, n_new: int) -> in
             [
                 ("stopped", _stopped(results)),
                 ("played", played if n_new else ""),
-                ("batch", str(directory)),
+                ("batch", Text(str(directory))),
                 ("next", Text("\n".join(command))),
             ]
         ),

@@ -8,6 +8,8 @@ import re
 import time
 from importlib import metadata
 
+from rich.text import Text
+
 import tussle
 from tussle.cli.options import MissionOptions
 from tussle.cli.play import simulate
@@ -39,7 +41,10 @@ def doctor(_: DoctorOptions) -> int:
         missing = ", ".join(name for name in names if not version_of(name))
         advice = f"not installed: {missing}; pip install 'tussle[{extra}]'"
         facts.append((f"extra {extra}", advice if missing else "installed"))
-    facts += [("kernels", f"kept in {home_short(store.directory())}"), ("processors", str(os.cpu_count()))]
+    facts += [
+        ("kernels", Text(f"kept in {home_short(store.directory())}")),
+        ("processors", str(os.cpu_count())),
+    ]
     put(fact_list(facts))
     with compiling():
         state_hash, speed = play()

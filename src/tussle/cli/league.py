@@ -86,7 +86,7 @@ def league(options: LeagueOptions) -> int:
                 f"{standings.n_games:,} games · {seeds_text(plan.first_seed, plan.n_runs)}",
             ),
         )
-        put(*tables(standings), fact_list([("page", home_short(page))]), "")
+        put(*tables(standings), fact_list([("page", Text(home_short(page)))]), "")
     if standings.n_failed:
         say_note(
             f"{standings.n_failed:,} games failed and count for nobody; tussle analyze {directory} lists them"

@@ -178,7 +178,7 @@ def show_study(study: Study, optimization: Optimization, directory: Path, search
             [
                 *_facts(study),
                 ("searched", searched),
-                ("study", str(directory)),
+                ("study", Text(str(directory))),
                 ("next", "play the best values with seeds that the search did not use:" if command else ""),
             ]
         ),

@@ -161,8 +161,8 @@ def show_sample(sample: Sample, study: Stress, directory: Path, options: StressO
             [
                 ("failed", f"{n_failed:,} of {n:,} games, {share(sample.value, sample.low, sample.high)}"),
                 ("robustness", quantiles and f"{quantiles} (least, 5 %, median)"),
-                ("study", str(directory)),
-                ("next", "" if n_failed else f"{shlex.join(command_line())} --probability"),
+                ("study", Text(str(directory))),
+                ("next", "" if n_failed else Text(f"{shlex.join(command_line())} --probability")),
             ]
         ),
     )
@@ -181,7 +181,7 @@ def show_search(found: FailureSearch, study: Stress, directory: Path, options: S
                 ("failed", f"{found.n_failed:,} of {n:,} games{other if found.n_failed else ''}"),
                 ("first failure", "" if found.first is None else f"game {found.first:,}"),
                 ("least robustness", f"{nearest.robustness:.6g}, with {found.label(nearest) or f'seed {nearest.played.game.seed}'}"),
-                ("study", str(directory)),
+                ("study", Text(str(directory))),
             ]
         ),
     )  # fmt: skip
@@ -214,7 +214,7 @@ def show_probability(found: Probability, study: Stress, directory: Path, options
                 ("time", f"{found.game_s:,.0f} s of games in {found.cpu_s:,.1f} s of CPU time"),
                 ("levels", f"{np.median([len(r.levels) for r in found.repetitions]):.0f} in a repetition"),
                 ("ancestors", ancestors and f"{ancestors} first games of a repetition have failing branches"),
-                ("study", str(directory)),
+                ("study", Text(str(directory))),
             ]
         ),
     )
@@ -242,7 +242,7 @@ def show_importance(
                 ("games", f"{found.n_games:,}, {found.n:,} of them for the estimate{plain}"),
                 ("weights", weights if found.n_failed else ""),
                 ("time", f"{found.game_s:,.0f} s of games in {found.cpu_s:,.1f} s of CPU time"),
-                ("study", str(directory)),
+                ("study", Text(str(directory))),
             ]
         ),
     )

@@ -9,9 +9,10 @@ from typing import Any
 
 from rich.console import RenderableType
 from rich.padding import Padding
+from rich.text import Text
 
 from tussle.cli.progress import times
-from tussle.cli.tables import fact_list, number_tables, title
+from tussle.cli.tables import Cell, fact_list, number_tables, title
 from tussle.cli.terminal import put
 from tussle.declare.displays import counted, number
 from tussle.engine.result import WorldResult
@@ -55,11 +56,11 @@ class Speed:
 def show_summary(simulation: Simulation, name: str, speed: Speed, directory: Path | None) -> None:
     """Print the result of world 0 of a simulation."""
     result, mission = simulation.result()[0], mission_entry(simulation.mission)
-    facts = [
+    facts: list[tuple[str, Cell]] = [
         ("speed", str(speed)),
         ("grade", simulation.grade),
         ("hash", result.state_hash),
-        ("run", str(directory) if directory is not None else "not recorded (--no-log)"),
+        ("run", Text(str(directory)) if directory is not None else "not recorded (--no-log)"),
     ]
     head = title(mission["name"] or name, game_facts(result, mission))
     put("", head, *result_tables(result, mission, facts), "")
@@ -73,7 +74,7 @@ def game_facts(result: WorldResult, mission: Mapping[str, Any]) -> str:
 
 
 def result_tables(
-    result: WorldResult, mission: Mapping[str, Any], facts: Sequence[tuple[str, str]]
+    result: WorldResult, mission: Mapping[str, Any], facts: Sequence[tuple[str, Cell]]
 ) -> Iterator[RenderableType]:
     """Yield the result of a world: teams, networks that lose messages, and why it ended, with further facts.
 

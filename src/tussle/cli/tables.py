@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import textwrap
 from collections.abc import Iterable, Sequence
 
 from rich import box
@@ -89,15 +90,30 @@ def indented(part: RenderableType) -> Padding:
     return Padding(part, (1, 0, 0, 1), expand=False)
 
 
-def fact_list(facts: Iterable[tuple[str, Cell]]) -> Padding:
-    """Return names and values, one pair per line; pairs without a value are left out."""
-    grid = Table.grid(padding=(0, 2))
-    grid.add_column(style="dim", no_wrap=True)
-    grid.add_column(overflow="fold")
-    for name, value in facts:
-        if value:
-            grid.add_row(name, value)
-    return indented(grid)
+def fact_list(facts: Iterable[tuple[str, Cell]]) -> Text:
+    """Return names and values, one pair per line below an empty line; pairs without a value are left out.
+
+    Values wrap between words. A `Text`, such as a path or a command, stays on one line, to be copied.
+    """
+    shown = [(name, value) for name, value in facts if value]
+    indent = max((_width(name) for name, _ in shown), default=0) + GAP
+    made = Text(no_wrap=True)
+    for name, value in shown:
+        room = max(out().width - indent - 1, 8)
+        lines: Sequence[Cell] = list(value.split("\n")) if isinstance(value, Text) else _wrapped(value, room)
+        for i, line in enumerate(lines):
+            label = "" if i else name
+            made.append("\n " + label, "dim").append(" " * (indent - cell_len(label))).append(line)
+    return made
+
+
+def _wrapped(text: str, width: int) -> list[str]:
+    """The lines of a text, wrapped between words; a long word, such as a hash, stays whole."""
+    return [
+        part
+        for line in text.split("\n")
+        for part in textwrap.wrap(line, width, break_long_words=False, break_on_hyphens=False)
+    ]
 
 
 def title(name: str, *facts: str) -> Text:

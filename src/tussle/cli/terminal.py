@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import sys
 import traceback
@@ -167,12 +168,19 @@ def reported(is_debugging: bool) -> Iterator[None]:
 def _report(error: BaseException) -> None:
     if isinstance(error, KeyboardInterrupt):
         say("interrupted", str(error) or "nothing was played", "bold yellow")
-    elif isinstance(error, (TussleError, OSError)):
+    elif isinstance(error, OSError):
+        say_error(_told(error))
+    elif isinstance(error, TussleError):
         say_error(str(error))
     else:
         say_error(
             f"internal error: {type(error).__name__}: {error}\nThis is a bug in tussle. --debug shows the traceback."
         )
+
+
+def _told(error: OSError) -> str:
+    is_output = error.filename is None and error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
+    return f"the output cannot be written: {error.strerror}" if is_output else str(error)
 
 
 def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
@@ -188,14 +196,19 @@ def run_guarded(program: Callable[[], Any]) -> None:
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="replace")
+    code: Any = OK
+    error: OSError | None = None
     try:
         program()
     except SystemExit as end:
-        error = _write_out()
-        if error is None or end.code:
-            raise
-        say_error(str(error))
-        raise SystemExit(NOT_WRITTEN) from None
+        code = end.code
+    except OSError as reason:  # a page of help that cannot be written
+        error = reason
+    error = _write_out() or error
+    if error is None or code:
+        raise SystemExit(code)
+    say_error(_told(error))
+    raise SystemExit(NOT_WRITTEN)
 
 
 def _write_out() -> OSError | None:

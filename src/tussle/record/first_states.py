@@ -8,13 +8,14 @@ from typing import Any
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.csv
 
 from tussle.documents import size_of
 from tussle.errors import ParameterError, RecordError, listed
+from tussle.mission.spec import MAX_COORDINATE
 from tussle.record.arrow_file import read_batches
 from tussle.record.parquet_file import MARGIN, MAX_EXPANSION, read_parquet
 from tussle.record.schema import TRAJECTORY, TRAJECTORY_FILE
+from tussle.tables import check_columns, check_one_state, read_csv, whole_numbers
 
 TIME = ("t", "time")
 POS, QUAT, VEL = ("x", "y", "z"), ("qw", "qx", "qy", "qz"), ("vx", "vy", "vz")
@@ -57,6 +58,11 @@ class FirstStates:
             wrong = ~np.isfinite(np.atleast_2d(values)).all(axis=0)
             if wrong.any():
                 raise ParameterError(f"{self.source}: {name} of entity {self.id[wrong][0]} is not finite")
+        far = (np.abs(self.pos) > MAX_COORDINATE).any(axis=0)
+        if far.any():
+            raise ParameterError(
+                f"{self.source}: pos of entity {self.id[far][0]} is not within +-{MAX_COORDINATE:g} m"
+            )
         length = np.sqrt((self.quat**2).sum(axis=0))
         wrong = np.abs(length - 1.0) > 1e-6  # a text table rounds, but less than this
         if wrong.any():
@@ -80,16 +86,14 @@ def read_table(path: str | Path, *, world: int = 0) -> FirstStates:
         world: Number of the world in its stack.
 
     Raises:
-        RecordError: The file cannot be read, or lacks a column.
-        ParameterError: A state is not finite, a quaternion is not of length 1, or an id is not allowed.
+        RecordError: The file cannot be read, lacks a column, or has two first states of an entity.
+        ParameterError: A state is not finite, a position is too far away, a quaternion is not of length 1, or an id is not allowed.
     """
     place = Path(path)
     place = place / TRAJECTORY_FILE if place.is_dir() else place
     table = _read(place)
     time = next((name for name in TIME if name in table.column_names), None)
-    missing = [name for name in NEEDED if name not in table.column_names] + ([] if time else ["t"])
-    if missing:
-        raise RecordError(f"{place}: column {missing[0]!r} is missing; {listed(table.column_names)}")
+    _check_columns(place, table.column_names)
     if "world" in table.column_names:
         table = table.filter(pa.array(_numbers(place, table, "world") == world))
     if not table.num_rows:
@@ -98,12 +102,17 @@ def read_table(path: str | Path, *, world: int = 0) -> FirstStates:
         )
     assert time is not None
     t, ids = _numbers(place, table, time), _whole(place, table, "id")
-    order = np.lexsort((ids, t))
-    _, first = np.unique(ids[order], return_index=True)
-    rows = order[np.sort(first)]
+    columns = {name: _numbers(place, table, name) for name in (*POS, *QUAT, *VEL)}
+    order = np.lexsort((t, ids))
+    _, first, number = np.unique(ids[order], return_index=True, return_inverse=True)
+    early = order[t[order] == t[order[first]][number]]  # all rows of each entity at its first time
+    at_first = np.stack([values[early] for values in columns.values()])
+    check_one_state(str(place), ids[early], t[early], at_first, RecordError)
+    rows = order[first]
+    rows = rows[np.lexsort((ids[rows], t[rows]))]
 
     def take(*names: str) -> np.ndarray:
-        return np.array([_numbers(place, table, name)[rows] for name in names])
+        return np.array([columns[name][rows] for name in names])
 
     team = _whole(place, table, "team")[rows] if "team" in table.column_names else None
     block = tuple(table["block"].take(rows).to_pylist()) if "block" in table.column_names else None
@@ -120,10 +129,12 @@ def _numbers(place: Path, table: pa.Table, name: str) -> np.ndarray:
 
 
 def _whole(place: Path, table: pa.Table, name: str) -> np.ndarray:
-    numbers = _numbers(place, table, name)
-    if not (np.abs(numbers) < 2**31).all():  # false for NaN too
-        raise RecordError(f"{place}: column {name!r} must hold integers between -2^31 and 2^31")
-    return numbers.astype(np.int64)
+    return whole_numbers(str(place), name, _numbers(place, table, name), RecordError)
+
+
+def _check_columns(place: Path, names: list[str]) -> None:
+    time = [] if any(name in names for name in TIME) else ["t"]
+    check_columns(str(place), names, (*NEEDED, *time), RecordError)
 
 
 def _read(place: Path) -> pa.Table:
@@ -137,16 +148,21 @@ def _read(place: Path) -> pa.Table:
     try:
         if name.endswith(".arrow"):  # a truncated table may hold all first states
             batches = list(read_batches(place, [], RecordError))
-            return _columns(pa.Table.from_batches(batches, None if batches else TRAJECTORY))
+            return _columns(place, pa.Table.from_batches(batches, None if batches else TRAJECTORY))
         if name.endswith(".parquet"):
             return read_parquet(place, pa.schema([]), RecordError, READ)
         most = MARGIN + MAX_EXPANSION * size_of(place)
-        return _columns(pyarrow.csv.read_csv(_decompressed(place, most) if name.endswith(".gz") else place))
+        return _columns(
+            place,
+            read_csv(
+                str(place), _decompressed(place, most) if name.endswith(".gz") else str(place), RecordError
+            ),
+        )
     except (pa.ArrowException, OSError, ValueError) as error:
         raise RecordError(f"{place}: cannot be read: {error}") from error
 
 
-def _decompressed(place: Path, most: int) -> pa.BufferReader:
+def _decompressed(place: Path, most: int) -> pa.Buffer:
     """The decompressed content of a file.
 
     Raises:
@@ -158,10 +174,11 @@ def _decompressed(place: Path, most: int) -> pa.BufferReader:
             parts.append(part)
     if sum(map(len, parts)) > most:
         raise OSError(f"its decompressed size exceeds the limit of {most:,} bytes")
-    return pa.BufferReader(b"".join(parts))
+    return pa.py_buffer(b"".join(parts))
 
 
-def _columns(table: Any) -> pa.Table:
+def _columns(place: Path, table: Any) -> pa.Table:
     if len(set(table.column_names)) < table.num_columns:
         raise ValueError(f"two columns have the same name; {listed(table.column_names)}")
+    _check_columns(place, table.column_names)
     return table.select([name for name in table.column_names if name in READ])

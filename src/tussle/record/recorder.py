@@ -155,9 +155,7 @@ class Recorder:
             self.directory.mkdir(parents=True, exist_ok=True)
             held = [name for name in FILES if (self.directory / name).exists()]
             if held:
-                raise RecordError(
-                    f"{self.directory}: holds a run already ({held[0]}); choose another directory, or remove it"
-                )
+                raise self._held(held[0])
             home, copies = real_path(self.directory), plugin_copies(plugin_files)
             inside = {
                 name: file for name, file in scene_files.items()
@@ -168,6 +166,8 @@ class Recorder:
                     raise RecordError(
                         f"{self.directory}: holds another file {name!r}, which belongs to a run of this mission; choose another directory"
                     )
+            # Of recorders that begin here at the same time, one makes this file.
+            (self.directory / TRAJECTORY_FILE).touch(exist_ok=False)
             seeds = self.sim.state.context.seeds
             if mission_text and len(seeds) == 1:
                 mission_text = with_seed(mission_text, int(seeds[0]))
@@ -186,6 +186,8 @@ class Recorder:
                 (self.directory / name).write_text(text, encoding="utf-8")
                 self._others.append(name)
         except OSError as error:
+            if isinstance(error, FileExistsError) and error.filename == str(self.directory / TRAJECTORY_FILE):
+                raise self._held(TRAJECTORY_FILE) from None
             raise RecordError(
                 f"{self.directory}: cannot record a run there: {error.strerror or error}"
             ) from error
@@ -204,6 +206,11 @@ class Recorder:
             self._result_stream = Stream(self.directory / RESULTS_FILE, RESULTS)
             self._streams.append(self._result_stream)
         self._traffic = Traffic(self.sim.mission.networks, self.directory, self.sim.n_worlds)
+
+    def _held(self, name: str) -> RecordError:
+        return RecordError(
+            f"{self.directory}: holds a run already ({name}); choose another directory, or remove it"
+        )
 
     def _written_back(self) -> str:
         seeds = self.sim.state.context.seeds

@@ -308,15 +308,18 @@ def test_a_run_that_was_killed_is_intact_as_far_as_it_goes(tussle, folder):
 
 
 @pytest.mark.parametrize("unbuffered", ["", "1"])
-def test_a_full_disk_is_told(folder, unbuffered):
+@pytest.mark.parametrize(
+    "line", ["run game.xml --no-log", "run --help", "--help", "--version", "plugins", "schema", "--show-completion bash"]
+)  # fmt: skip
+def test_a_full_disk_is_told(folder, unbuffered, line):
     with open("/dev/full", "w") as full:  # noqa: PTH123 - a device
         done = subprocess.run(
-            [*COMMAND, "run", "game.xml", "--no-log"],
+            [*COMMAND, *line.split()],
             check=False, stdout=full, stderr=subprocess.PIPE, text=True, cwd=folder, timeout=600,
             env=environment() | {"PYTHONUNBUFFERED": unbuffered},
         )  # fmt: skip
     assert done.returncode == 4
-    assert done.stderr == "error: [Errno 28] No space left on device\n"
+    assert done.stderr == "error: the output cannot be written: No space left on device\n"
 
 
 def test_output_that_nobody_reads_is_no_error(folder):

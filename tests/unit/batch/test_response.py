@@ -138,10 +138,29 @@ def test_a_quantity_that_does_not_vary_is_a_flat_line():
     points = sample([UAV, TACTIC], "lhs", 9, 0)
     fit = fitted([UAV, TACTIC], points, np.full((5, 9), 7.0))
     found = fit.along("uav", [5, 20])
-    np.testing.assert_allclose(found.value, 7.0, atol=1e-3)
+    for values in (found.value, found.low, found.high):
+        np.testing.assert_array_equal(values, 7.0)
+    assert fit.difference("uav", 5, 20) == (0.0, 0.0, 0.0)
     ones = fitted([UAV, TACTIC], points, np.ones((5, 9)), is_share=True).along("uav", [5, 20])
     assert (ones.low < 1.0).all()
     assert (ones.value > 0.95).all()
+
+
+@pytest.mark.parametrize("unit", [1e-9, 1e-3, 1e6])
+@pytest.mark.parametrize(
+    "kind", ["means differ", "means are equal", "all runs are equal", "one run of each point"]
+)
+def test_a_band_is_in_the_unit_of_the_quantity(unit, kind):
+    points = sample([UAV, TACTIC], "lhs", 9, 0)
+    values = {
+        "means differ": played(points, 5, 0),
+        "means are equal": np.repeat([[1.0], [2.0]], 9, axis=1),
+        "all runs are equal": np.full((5, 9), 0.25),
+        "one run of each point": np.full((1, 9), 0.25),
+    }[kind]
+    one, other = (fitted([UAV, TACTIC], points, k * values).along("uav", [5, 20]) for k in (1.0, unit))
+    for name in ("value", "low", "high"):
+        np.testing.assert_allclose(getattr(other, name), unit * getattr(one, name), rtol=1e-4)
 
 
 @pytest.mark.parametrize("is_share", [False, True])

@@ -1,9 +1,12 @@
 """Tables on a terminal of 80 columns."""
 
+import re
+
 import pytest
+from rich.text import Text
 
 from tussle.cli import terminal
-from tussle.cli.tables import estimate, number_tables
+from tussle.cli.tables import estimate, fact_list, number_tables
 
 METRICS = (
     "captures",
@@ -72,3 +75,28 @@ def test_a_text_wider_than_the_terminal_is_folded(seen):
 )
 def test_an_estimate_has_the_digits_that_its_interval_allows(numbers, text):
     assert estimate(*numbers) == text
+
+
+@pytest.mark.parametrize("columns", ["1", "40", "80"])
+@pytest.mark.parametrize("is_terminal", [False, True])
+def test_what_is_copied_from_facts_stays_whole(monkeypatch, capsys, columns, is_terminal):
+    path, hash_ = f"runs/a folder/{'long' * 40}", "910ad8642bda15860bd1babd661511e0"
+    words = "335 × real time (1.49 s, 1.00 CPU s), ready after 5.1 s"
+    monkeypatch.setenv("COLUMNS", columns)
+    if is_terminal:
+        monkeypatch.setenv("FORCE_COLOR", "1")
+    terminal.out.cache_clear()
+    try:
+        terminal.put(
+            fact_list([("speed", words), ("none", ""), ("hash", hash_), ("run", Text(f"{path}\ntussle --from {path}:0"))])
+        )  # fmt: skip
+    finally:
+        terminal.out.cache_clear()
+    shown = re.sub(r"\x1b\[\d*m", "", capsys.readouterr().out)
+    lines = shown.splitlines()
+    assert lines[0] == ""
+    assert [line[1:6] for line in lines[1:] if line[1] != " "] == ["speed", "hash ", "run  "]
+    assert all(line.startswith(" " * 8) for line in lines[1:] if line[1] == " ")
+    assert [line[8:] for line in lines[-3:]] == [hash_, path, f"tussle --from {path}:0"]
+    assert " ".join(line[8:] for line in lines[1:-3]) == words
+    assert max(map(len, lines[1:-3])) <= max(int(columns), 20)

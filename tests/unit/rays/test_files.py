@@ -59,6 +59,10 @@ TRIANGLES = [[0, 1, 4], [1, 2, 4], [0, 1, 2], [0, 2, 3], [2, 3, 4], [3, 4, 0]]
         (GRID.replace("3 4 5\n0 1", "-1 -1 -1\n-1 -1"), "no cell has a height"),
         ("", "has no ncols"),
         ("ncols ä", "cannot be read"),
+        (
+            GRID.replace("cellsize 10", "cellsize 0.00028"),
+            "cells of 0.00028 m are too small .* differ by 5 m, so the grid is in degrees",
+        ),
     ],
 )
 def test_what_is_no_grid(tmp_path, text, told):
@@ -109,7 +113,10 @@ def test_images(tmp_path, bits, white):
     assert read_surface(path, cell=5.0, height=50.0, position=(1.0, 2.0, 0.0)) == expected
 
 
-def geotiff(path, **tags):
+HEIGHTS = np.array([[3, 4, -9], [0, 1, 2]], np.float32)
+
+
+def geotiff(path, heights=HEIGHTS, **tags):
     from PIL import Image
     from PIL.TiffImagePlugin import ImageFileDirectory_v2
 
@@ -117,7 +124,7 @@ def geotiff(path, **tags):
     for number, (kind, value) in tags.items():
         found.tagtype[int(number[1:])] = kind
         found[int(number[1:])] = value
-    Image.fromarray(np.array([[3, 4, -9], [0, 1, 2]], np.float32)).save(path, tiffinfo=found)
+    Image.fromarray(heights).save(path, tiffinfo=found)
     return path
 
 
@@ -135,9 +142,36 @@ def test_geotiff(tmp_path):
         ({}, r"the width of a pixel is not known; give cell="),
         ({"t33550": (12, (2.0, 3.0, 0.0))}, "the pixels are 2 x 3 m; they must be square"),
         ({"t33550": (12, (2.0, 2.0, 0.0)), "t42113": (2, "none")}, "data is 'none.*', which is no number"),
+        ({"t33550": (12, (1e-4, 1e-4, 0.0))}, "cells of 0.0001 m .*, so the grid is in degrees"),
+        *(
+            (
+                {
+                    "t33550": (12, (2.0, 2.0, 0.0)),
+                    "t34735": (3, (1, 1, 0, 2, 1024, 0, 1, 1, key, 0, 1, unit)),
+                },
+                f"{what} in {name}",
+            )
+            for key, what in ((3076, "coordinates"), (4099, "heights"))
+            for unit, name in ((9002, "feet"), (9003, "US survey feet"), (9036, "the unit EPSG:9036"))
+        ),
     ):
         with pytest.raises(ParameterError, match=message):
             read_surface(geotiff(tmp_path / "b.tif", **tags))
+    metres = (1, 1, 0, 3, 1024, 0, 1, 1, 3076, 0, 1, 9001, 4099, 0, 1, 9001)
+    assert read_surface(geotiff(path, t33550=(12, (2.0, 2.0, 0.0)), t34735=(3, metres))).cell == 2.0
+
+
+@pytest.mark.parametrize("kind", [np.float32, np.int32])
+def test_a_geotiff_of_numbers_with_a_sign_holds_heights(tmp_path, kind):
+    pytest.importorskip("PIL")
+    path = geotiff(tmp_path / "a.tif", HEIGHTS.astype(kind), t33550=(12, (2.0, 2.0, 0.0)), t42113=(2, "-9"))
+    assert read_surface(path) == HeightField([[0, 1, 2], [3, 4, 0]], cell=2.0)
+
+
+def test_a_grid_with_a_mark_of_unicode(tmp_path):
+    (tmp_path / "a.asc").write_text(GRID, encoding="utf-8-sig")
+    (tmp_path / "b.asc").write_text(GRID)
+    assert read_surface(tmp_path / "a.asc") == read_surface(tmp_path / "b.asc")
 
 
 def binary_vtk():
@@ -222,8 +256,16 @@ def test_meshes_by_trimesh(tmp_path):
         ),
         ("a.glb", glb({"asset": {"version": "2.0"}, "accessors": [{"count": 10**9}]}), "announces more than"),
         ("a.glb", glb({"accessors": 5}), "it cannot be read as .glb"),
-        ("a.gltf", b'{"buffers": [{"uri": "../../secret.bin"}]}', "it cannot be read as .gltf"),
-        ("a.obj", b"v 0 0 nan\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "coordinate"),
+        (
+            "a.gltf",
+            b'{"buffers": [{"uri": "../../secret.bin"}]}',
+            "its buffer '../../secret.bin' lies in another file; save it in one",
+        ),
+        (
+            "a.obj",
+            b"v 0 0 nan\nv 1 0 0\nv 0 1 0\nf 1 2 3\n",
+            "has the coordinate nan; coordinates are numbers",
+        ),
         ("a.obj", b"v 0 0 0\nf 1 2 9\n", "a.obj: "),
         ("a.obj", b"v 0 0\nv 1 0\nv 0 1\nf 1 2 3\n", r"a.obj: its vertices have shape \(3, 2\)"),
         ("a.ply", b"no mesh", "a.ply: it cannot be read as .ply"),

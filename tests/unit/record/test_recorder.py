@@ -280,6 +280,21 @@ def test_a_directory_holds_one_run(tmp_path):
     assert (tmp_path / "run.json").read_bytes() == before
 
 
+@pytest.mark.parametrize("looks_first", [True, False])
+def test_of_two_recorders_in_a_directory_the_second_is_refused(tmp_path, monkeypatch, looks_first):
+    """Also where it has looked before the first one began."""
+    with Recorder(Simulation(hunt(end=0.5), 7), tmp_path) as first:
+        second = Simulation(hunt(end=0.2), 8)
+        with monkeypatch.context() as patched:
+            if not looks_first:
+                patched.setattr("tussle.record.recorder.FILES", ())
+            with pytest.raises(RecordError, match="holds a run already"):
+                Recorder(second, tmp_path)
+        first.sim.run()
+    assert load_run(tmp_path).summary_table["seed"].to_pylist() == [7] * 2
+    assert load_run(tmp_path).is_complete
+
+
 def test_where_nothing_can_be_written_nothing_begins(tmp_path):
     (tmp_path / "file").write_text("in the way")
     sim = Simulation(hunt())

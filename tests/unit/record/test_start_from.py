@@ -142,6 +142,7 @@ def states(**changes):
     ("changes", "words"),
     [
         ({"pos": np.zeros((3, 3))}, r"pos has shape \(3, 3\); expected \(3, 2\)"),
+        ({"pos": np.array([[0.0, -1.1e9]] * 3)}, r"pos of entity 2 is not within \+-1e\+09 m"),
         ({"vel": np.array([[0.0, np.nan]] * 3)}, "vel of entity 2 is not finite"),
         ({"quat": np.full((4, 2), 0.4)}, "quaternion of entity 1 has length 0.8"),
         ({"id": np.array([3, 3])}, "unique"),

@@ -12,7 +12,8 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from tussle.errors import RecordError
+from tussle.errors import ParameterError, RecordError
+from tussle.plugins.stock.autonomy.trajectory_record_playback.table import read_recorded
 from tussle.record.arrow_file import read_batches
 from tussle.record.first_states import read_table
 from tussle.record.parquet_file import read_parquet
@@ -225,6 +226,7 @@ def test_a_csv_that_is_a_bomb_is_refused(tmp_path, monkeypatch):
     [
         ({"id": [1.5e300]}, "column 'id' must hold integers"),
         ({"team": [math.nan]}, "column 'team' must hold integers"),
+        ({"team": [0.5]}, "column 'team' must hold integers .*, not 0.5"),
         ({"world": ["a"]}, "column 'world' must hold numbers"),
         ({"block": [1]}, "column 'block' must hold names"),
     ],
@@ -238,3 +240,60 @@ def test_a_table_to_start_from_with_odd_columns_is_refused(tmp_path, change, sai
     table = pa.table(row | {"other": [0]}).rename_columns([*row, "x"])
     with pytest.raises(RecordError, match="two columns have the same name"):
         read_table(put(tmp_path / "b.arrow", table))
+
+
+HEAD = "id,t,x,y,z,qw,qx,qy,qz,vx,vy,vz"
+FIRST, OTHER = "1,0,5,6,7,1,0,0,0,1,0,0", "1,0,8,6,7,1,0,0,0,1,0,0"
+READERS = {
+    "start": (read_table, RecordError),
+    "playback": (lambda path: read_recorded(str(path)), ParameterError),
+}
+
+
+@pytest.mark.parametrize("reader", READERS)
+@pytest.mark.parametrize(
+    ("lines", "said"),
+    [
+        ((HEAD, FIRST.replace("1,", "1.5,", 1)), "column 'id' must hold integers .*, not 1.5"),
+        ((HEAD, FIRST, OTHER), "entity 1 has two states at t = 0 s; it takes one"),
+        ((HEAD, OTHER, FIRST, FIRST), "entity 1 has two states at t = 0 s"),
+        ((f"x,{HEAD}", f"9,{FIRST}"), "two columns have the same name; there are: x, id, t, x"),
+        ((HEAD.upper(), FIRST), "column 'id' is missing .*'ID'.*; there are: ID, T, X"),
+        ((f"name,{HEAD[:-3]}", f"a,{FIRST[:-2]}"), "column 'vz' is missing.*; there are: name, id, t, x"),
+        *(
+            ((HEAD.replace(",", mark), FIRST.replace("5", number).replace(",", mark)), f"its values are separated by {name}")
+            for mark, name in ((";", "';'"), ("\t", "tabs"), ("|", "'\\|'"))
+            for number in ("5", "5.5")
+        ),
+        ((HEAD.replace(",", ";"), FIRST.replace(",", ";").replace("5", "5,5")), "takes commas between values, and points in numbers"),
+    ],
+)  # fmt: skip
+def test_a_csv_of_another_program_is_refused_for_what_it_is(tmp_path, reader, lines, said):
+    path = tmp_path / "a.csv"
+    path.write_text("\n".join(lines) + "\n")
+    read_it, error = READERS[reader]
+    with pytest.raises(error, match=rf"a\.csv: .*{said}"):
+        read_it(path)
+
+
+@pytest.mark.parametrize("reader", READERS)
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda text: "\ufeff" + text,
+        lambda text: text.replace("\n", "\r\n"),
+        lambda text: text.replace(",", ", "),
+        lambda text: text.replace("\n1,", "\n1.0,"),
+        lambda text: text + FIRST + "\n",  # once more the same
+        lambda text: text.replace("id", "note,id").replace("\n1,", "\nhi,1,"),
+    ],
+)
+def test_a_csv_of_another_program_is_read_as_our_own(tmp_path, reader, change):
+    text = f"{HEAD}\n{FIRST}\n"
+    (tmp_path / "a.csv").write_text(text)
+    (tmp_path / "b.csv").write_text(change(text), newline="")
+    own, other = (READERS[reader][0](tmp_path / name) for name in ("a.csv", "b.csv"))
+    at = ("pos", "quat", "vel") if reader == "start" else ("values",)
+    for name in at:
+        np.testing.assert_array_equal(getattr(own, name)[:, :1], getattr(other, name)[:, :1])
+    assert own.id.tolist() == other.id.tolist() == [1]

@@ -258,8 +258,8 @@ def test_a_recorded_flight_is_flown_again_and_ends_with_the_record(tmp_path, mon
     ("text", "error"),
     [
         (None, r"run.csv: No such file or directory; it takes a table of `tussle export --csv`"),
-        ("", r"run.csv is no table in CSV"),
-        ("id,t,x,y\n1,0,0,0\n", r"run.csv has no column 'z'; there are: id, t, x, y"),
+        ("", r"run.csv: cannot be read: Empty CSV"),
+        ("id,t,x,y\n1,0,0,0\n", r"run.csv: column 'z' is missing; there are: id, t, x, y"),
         (",".join(HEAD) + "\n0,0,9" + ",0" * 10 + "\n", r"run.csv has no entity 1; there are: 9"),
         (",".join(HEAD) + "\n0,0,1" + ",0" * 9 + ",fast\n", r"column 'vz' has values that are no numbers"),
         (",".join(HEAD) + "\n0,0,1" + ",0" * 9 + ",nan\n", r"run.csv, line 2: vz is not a finite number"),

@@ -31,22 +31,22 @@ def encoded(image: np.ndarray, kind: str = "PNG") -> bytes:
     return file.getvalue()
 
 
-def geo_keys(code: int, is_point: bool = False) -> tuple[int, ...]:
+def geo_keys(code: int, is_point: bool = False, unit: int = 0) -> tuple[int, ...]:
     """The keys of a projection: a head, and four numbers of each."""
     kind, key = GEOGRAPHIC if code in (4326, 4269) else PROJECTED
-    keys = [(1024, kind), (1025, 2 if is_point else 1), (key, code)]
+    keys = [(1024, kind), (1025, 2 if is_point else 1), (key, code), *([(3076, unit)] if unit else [])]
     return (1, 1, 0, len(keys), *(n for name, value in keys for n in (name, 0, 1, value)))
 
 
 def write_geotiff(
     path: Path, image: np.ndarray, code: int | None, *, scale: tuple[float, ...] = (), tie: tuple[float, ...] = (),
-    matrix: tuple[float, ...] = (), is_point: bool = False, compression: str = "tiff_lzw",
+    matrix: tuple[float, ...] = (), is_point: bool = False, unit: int = 0, compression: str = "tiff_lzw",
 ) -> Path:  # fmt: skip
     """Write a GeoTIFF, or one that lacks something."""
     tags = ImageFileDirectory_v2()
     for tag, kind, values in (
         (33550, DOUBLE, scale), (33922, DOUBLE, tie), (34264, DOUBLE, matrix),
-        (34735, SHORT, () if code is None else geo_keys(code, is_point)),
+        (34735, SHORT, () if code is None else geo_keys(code, is_point, unit)),
     ):  # fmt: skip
         if values:
             tags.tagtype[tag] = kind

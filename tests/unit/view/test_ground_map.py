@@ -25,6 +25,7 @@ from tussle.view.ground_map import read_bounds
 from tussle.view.ground_map.placed import GREY, Area
 from tussle.view.ground_map.projections import MERCATOR, projection_of
 from tussle.world.geodesy import Origin
+from tussle.world.rays.files import read_texture
 from tussle.world.rays.textures import MAX_SIDE
 
 RADIUS = 6378137.0
@@ -295,6 +296,7 @@ SCALE, TIE = (1e-3, 1e-3, 0.0), (0.0, 0.0, 0.0, 13.2, 52.1, 0.0)
         ("rotated or mirrored", 4326, {"matrix": (1e-3, 1e-4, 0, 13.2, 1e-4, -1e-3, 0, 52.1, *[0] * 7, 1)}),
         ("rotated or mirrored", 4326, {"matrix": (1e-3, 0, 0, 13.2, 0, 1e-3, 0, 52.1, *[0] * 7, 1)}),
         ("rotated or mirrored", 4326, {"scale": (0.0, 1e-3, 0.0), "tie": TIE}),
+        ("coordinates in feet, not in metres", 32633, {"scale": SCALE, "tie": TIE, "unit": 9002}),
         ("outside the mission's area", 4326, {"scale": SCALE, "tie": (0, 0, 0, 52.1, 13.2, 0)}),
     ],
 )
@@ -343,6 +345,23 @@ def test_pictures_of_all_kinds_of_pixels(tmp_path):
     for mode in ("1", "L", "LA", "P", "RGB", "RGBA"):
         Image.fromarray(coded()).convert(mode).save(tmp_path / "m.png")
         assert GroundMap(tmp_path / "m.png", BOUNDS).over(area(52.0, 13.3)).image.std() > 10, mode
+
+
+@pytest.mark.parametrize("turn", range(1, 9))
+def test_a_photo_lies_as_all_viewers_of_pictures_show_it(tmp_path, turn):
+    from PIL import ImageOps
+
+    exif = Image.Exif()
+    exif[0x0112] = turn
+    Image.fromarray(coded()).save(tmp_path / "camera.png", exif=exif)
+    with Image.open(tmp_path / "camera.png") as photo:
+        ImageOps.exif_transpose(photo).save(tmp_path / "plain.png", exif=b"")
+    maps = [
+        GroundMap(tmp_path / f"{name}.png", BOUNDS).over(area(52.0, 13.3)) for name in ("camera", "plain")
+    ]
+    np.testing.assert_array_equal(maps[0].image, maps[1].image)
+    np.testing.assert_array_equal(read_texture(tmp_path / "camera.png"), read_texture(tmp_path / "plain.png"))
+    assert (read_texture(tmp_path / "camera.png").shape[:2] == (200, 240)) is (turn < 5)
 
 
 def test_a_tiff_without_a_place_takes_bounds(tmp_path):

@@ -9,6 +9,7 @@ import numpy as np
 from tussle.errors import ParameterError
 from tussle.view.ground_map.placed import PlacedPicture
 from tussle.view.ground_map.projections import Projection, projection_of
+from tussle.world.rays.grids import foreign_unit
 
 PIXEL_SCALE, TIE_POINT, TRANSFORMATION, GEO_KEYS = 33550, 33922, 34264, 34735
 """Tags, annex A and section 7."""
@@ -29,9 +30,11 @@ def placed_geotiff(where: str, image: Any) -> PlacedPicture:
         image: The image of Pillow.
 
     Raises:
-        ParameterError: It has no place, is rotated, or has another projection.
+        ParameterError: It has no place, is rotated, is not in metres or degrees, or has another projection.
     """
     tags = image.tag_v2
+    if unit := foreign_unit(tags.get(GEO_KEYS, ())):
+        raise ParameterError(f"{where}: the GeoTIFF has {unit}; {ALLOWED}")
     projection, is_points = _system(where, tags.get(GEO_KEYS, ()))
     matrix = _matrix(where, tags)
     (across, turn, west), (lean, down, north) = matrix[0, [0, 1, 3]], matrix[1, [0, 1, 3]]

@@ -17,6 +17,7 @@ from tussle.view.ground_map.placed import Area, GroundPicture, PlacedPicture, op
 from tussle.view.ground_map.pmtiles import PmTiles
 from tussle.view.ground_map.projections import GEOGRAPHIC
 from tussle.view.ground_map.tiles import stitched
+from tussle.world.rays.textures import upright
 
 MAX_BYTES = 1 << 28
 """Size of a picture's file."""
@@ -99,6 +100,8 @@ class GroundMap:
         if self.bounds is None:
             with reading(where):  # its tags can be of any type
                 return placed_geotiff(where, image)
+        with reading(where):
+            image = upright(image)
         west, south, east, north = self.bounds
         width, height = image.size
         cell = ((east - west) / width, (north - south) / height)

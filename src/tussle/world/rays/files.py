@@ -77,7 +77,7 @@ def read_texture(path: Path | str) -> np.ndarray:
         MissingExtraError: Pillow is not installed.
         ParameterError: The file cannot be read, is too large, or is no image.
     """
-    return decoded(str(path), bytes_of(Path(path)))
+    return decoded(str(path), bytes_of(Path(path)), is_photo=True)
 
 
 def bytes_of(path: Path) -> bytes:
@@ -128,6 +128,13 @@ def _announced(suffix: str, data: bytes) -> int:
     return 0
 
 
+def _outside(suffix: str, data: bytes) -> str:
+    """The buffer of a .gltf file that lies in another file; "" if there is none."""
+    buffers = json.loads(data).get("buffers", ()) if suffix == ".gltf" else ()
+    named = (str(each["uri"]) for each in buffers if "uri" in each)
+    return next((f"buffer {clipped(uri)!r}" for uri in named if not uri.startswith("data:")), "")
+
+
 def _by_trimesh(path: Path, data: bytes) -> tuple[np.ndarray, np.ndarray]:
     """Vertices (n, 3) and faces (m, 3)."""
     try:
@@ -136,6 +143,10 @@ def _by_trimesh(path: Path, data: bytes) -> tuple[np.ndarray, np.ndarray]:
         raise MissingExtraError(f"{path}: meshes need trimesh: pip install 'tussle[scene]'") from None
     suffix = path.suffix.lower()
     try:
+        if outside := _outside(suffix, data):
+            raise ParameterError(
+                f"{path}: its {outside} lies in another file; save it in one file, as .glb, or as .gltf with embedded buffers"
+            )
         if _announced(suffix, data) > 3 * MAX_FACES:
             raise ParameterError(f"{path}: the mesh announces more than {MAX_FACES:,} triangles")
         # Without a path and a resolver, the file cannot make trimesh read other files.

@@ -74,7 +74,7 @@ def checked_numbers(name: str, values: object, n: int) -> np.ndarray:
         raise ParameterError(f"{name} has shape {numbers.shape}; it takes one number or ({n},)")
     if not (numbers >= 0.0).all():
         raise ParameterError(
-            f"{name} has the value {numbers[~(numbers >= 0.0)].flat[0]!r}; it takes lengths >= 0 m"
+            f"{name} has the value {numbers[~(numbers >= 0.0)].flat[0]:g}; it takes lengths >= 0 m"
         )
     return np.ascontiguousarray(np.broadcast_to(numbers, n))
 

@@ -254,7 +254,7 @@ def _check_coordinates(name: str, values: np.ndarray) -> None:
     wrong = ~(np.abs(values) <= MAX_COORDINATE)
     if wrong.any():
         raise ParameterError(
-            f"{name} has the coordinate {values[wrong].flat[0]!r}; coordinates are numbers within +-{MAX_COORDINATE:g} m"
+            f"{name} has the coordinate {values[wrong].flat[0]:g}; coordinates are numbers within +-{MAX_COORDINATE:g} m"
         )
 
 

@@ -17,12 +17,13 @@ FORMATS = ("PNG", "JPEG", "TIFF")
 JPEG_QUALITY = 88
 
 
-def decoded(where: str, data: bytes) -> np.ndarray:
+def decoded(where: str, data: bytes, is_photo: bool = False) -> np.ndarray:
     """Red, green, blue of an image from its upper left corner, (height, width, 3), uint8, at most `MAX_SIDE` wide and high.
 
     Args:
         where: File that has it, for messages.
         data: Its bytes.
+        is_photo: It is shown as cameras and all viewers of pictures mean it, see `upright`.
 
     Raises:
         MissingExtraError: Pillow is not installed.
@@ -34,7 +35,7 @@ def decoded(where: str, data: bytes) -> np.ndarray:
         raise MissingExtraError(f"{where}: images need Pillow: pip install 'tussle[maps]'") from None
     try:
         with Image.open(io.BytesIO(data), formats=FORMATS) as image:
-            return reduced(where, image)
+            return reduced(where, image, is_photo)
     except ParameterError:
         raise
     except Exception as error:  # decoders of damaged data raise errors of many kinds
@@ -43,7 +44,7 @@ def decoded(where: str, data: bytes) -> np.ndarray:
         ) from error
 
 
-def reduced(where: str, image: Any) -> np.ndarray:
+def reduced(where: str, image: Any, is_photo: bool = False) -> np.ndarray:
     """Pixels of an image of Pillow, as `decoded` returns them.
 
     Raises:
@@ -56,9 +57,18 @@ def reduced(where: str, image: Any) -> np.ndarray:
         )
     try:
         image.thumbnail((MAX_SIDE, MAX_SIDE))
+        image = upright(image) if is_photo else image
         return np.asarray(image.convert("RGB"))
     except Exception as error:  # decoders of damaged data raise errors of many kinds
         raise ParameterError(f"{where}: the image cannot be read: {clipped(str(error), 200)}") from error
+
+
+def upright(image: Any) -> Any:
+    """An image of Pillow, turned or mirrored as its tag of EXIF says, which cameras write that were held upright."""
+    from PIL import ExifTags, ImageOps
+
+    is_turned = image.getexif().get(ExifTags.Base.Orientation, 1) != 1
+    return ImageOps.exif_transpose(image) if is_turned else image
 
 
 def jpeg(pixels: np.ndarray) -> bytes:

@@ -33,7 +33,12 @@ export function times(speed) {
 
 /** Decimals that tell the times of two frames apart. @param {number} step seconds */
 export function decimalsOf(step) {
-  return Math.min(4, Math.max(1, Math.ceil(-Math.log10(step) - 1e-6)));
+  return Math.min(9, Math.max(1, Math.ceil(-Math.log10(step) - 1e-6)));
+}
+
+/** The length of a recording, to a tenth of a second where it has any. @param {number} seconds */
+export function duration(seconds) {
+  return `${seconds < 0.1 ? amount(seconds) : number(seconds, 1).replace(/\.0$/, '')} s`;
 }
 
 /** An event as a sentence. @param {GameEvent} event @param {(id: number) => string} who */

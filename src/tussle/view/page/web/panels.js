@@ -1,7 +1,7 @@
 // The cards on the page: title, teams, scores, the chosen entity, what is known of the run.
 /** @import { Colour, Mode, PageData, Status, Team } from './types' */
 
-import { amount, byId, cleared, element, fillList, length, number, rgb, say, styled } from './formatting.js';
+import { amount, byId, cleared, duration, element, fillList, length, number, rgb, say, styled } from './formatting.js';
 import { geodeticOf, sidesOf } from './geodesy.js';
 import { between, forward, minus, norm } from './geometry.js';
 import { NO_TEAM } from './layer.js';
@@ -46,8 +46,7 @@ export class Panels {
     if (!this.status) {
       const seed = page.facts.find(([name]) => name === 'Seed')?.[1];
       const n = `${page.nEntities.map((each) => number(each)).join(' and ')} ${String(page.nEntities) === '1' ? 'entity' : 'entities'}`;
-      const seconds = `${number(layer.end - layer.start, 1).replace(/\.0$/, '')} s`;
-      say(byId('subtitle'), [seed && `seed ${seed}`, n, seconds].filter(Boolean).join(' · '));
+      say(byId('subtitle'), [seed && `seed ${seed}`, n, duration(layer.end - layer.start)].filter(Boolean).join(' · '));
     }
     const differing = page.differing?.map(([path, a, b]) => `${path} ${a} and ${b}`) || [];
     const more = differing.length > MAX_DIFFERING ? ` and ${differing.length - MAX_DIFFERING} more, see About` : '';

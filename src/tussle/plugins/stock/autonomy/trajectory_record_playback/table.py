@@ -8,7 +8,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from tussle.errors import ParameterError, clipped, listed, nearest_name
+from tussle.errors import ParameterError
+from tussle.tables import check_columns, check_one_state, read_csv, whole_numbers
 
 COLUMNS = ("id", "t", "x", "y", "z", "qw", "qx", "qy", "qz", "vx", "vy", "vz")
 
@@ -60,19 +61,8 @@ def read_recorded(name: str) -> TrajectoryTable:
 
 @lru_cache(maxsize=8)
 def _read(name: str, _changed: int, _size: int) -> TrajectoryTable:
-    import pyarrow as pa
-    from pyarrow import csv
-
-    try:
-        table = csv.read_csv(name)
-    except (pa.ArrowInvalid, OSError) as error:
-        raise ParameterError(
-            f"{name} is no table in CSV: {clipped(' '.join(str(error).split()), 200)}"
-        ) from None
-    missing = next((column for column in COLUMNS if column not in table.column_names), None)
-    if missing:
-        guess = nearest_name(missing, table.column_names)
-        raise ParameterError(f"{name} has no column {missing!r}{guess}; {listed(table.column_names)}")
+    table = read_csv(name, name, ParameterError)
+    check_columns(name, table.column_names, COLUMNS, ParameterError)
     data: dict[str, Any] = {}
     for column in (*COLUMNS, *({"world"} & set(table.column_names))):
         try:
@@ -85,6 +75,8 @@ def _read(name: str, _changed: int, _size: int) -> TrajectoryTable:
     order = np.lexsort((data["t"], data["id"]))
     if "world" in data:
         order = order[data["world"][order] == data["world"].min(initial=np.inf)]
-    ids, start = np.unique(data["id"][order].astype(np.int64), return_index=True)
+    each, t = whole_numbers(name, "id", data["id"], ParameterError)[order], data["t"][order]
     values = np.stack([data[column][order] for column in COLUMNS[2:]])
-    return TrajectoryTable(ids, np.append(start, len(order)), data["t"][order], values)
+    check_one_state(name, each, t, values, ParameterError)
+    ids, start = np.unique(each, return_index=True)
+    return TrajectoryTable(ids, np.append(start, len(order)), t, values)
