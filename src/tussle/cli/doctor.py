@@ -15,7 +15,7 @@ from tussle.cli.options import MissionOptions
 from tussle.cli.play import simulate
 from tussle.cli.play_options import DoctorOptions
 from tussle.cli.progress import compiling, home_short, times
-from tussle.cli.tables import fact_list
+from tussle.cli.tables import Cell, fact_list
 from tussle.cli.terminal import OK, WRONG_INPUT, put, say_error
 from tussle.numeric import store
 
@@ -32,7 +32,7 @@ def doctor(_: DoctorOptions) -> int:
         The exit code.
     """
     needed, extras = requirements()
-    facts = [
+    facts: list[tuple[str, Cell]] = [
         ("tussle", tussle.__version__),
         ("Python", f"{platform.python_version()} on {platform.platform()}"),
         ("packages", ", ".join(f"{name} {version_of(name)}" for name in needed)),

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from itertools import chain
 from pathlib import Path
+from typing import Any
 
 import pyarrow as pa
 import pyarrow.compute as pc
@@ -127,35 +128,36 @@ def _write(
     plain = pa.schema(
         [pa.field(f.name, pa.string() if pa.types.is_dictionary(f.type) else f.type) for f in schema]
     )
-    texts = pa.schema(
-        [pa.field(f.name, pa.string() if pa.types.is_floating(f.type) else f.type) for f in plain]
-    )
     n_read = n_written = 0
     with whole_file(path) as part, pa.OSFile(str(part), "wb") as file:
         writer = (
-            pa.csv.CSVWriter(file, texts, write_options=pa.csv.WriteOptions(quoting_style="needed"))
+            pa.csv.CSVWriter(file, plain, write_options=pa.csv.WriteOptions(quoting_style="needed"))
             if kind == "csv"
             else pa.parquet.ParquetWriter(file, plain, compression="zstd")
         )
         with writer:
             for table in _grouped(batches, plain, 1 if kind == "csv" else ROWS_OF_A_GROUP):
                 kept = table if world is None else table.filter(pc.equal(table["world"], world))
-                writer.write_table(_with_points(kept, texts) if kind == "csv" else kept)
-                n_read, n_written = n_read + len(table), n_written + len(kept)
+                n_read, n_new = n_read + len(table), len(kept)
+                if kind == "csv" and n_new and not n_written:
+                    file.write(_first_line(kept.slice(0, 1).to_pylist()[0]).encode())
+                    kept = kept.slice(1)
+                writer.write_table(kept)
+                n_written += n_new
                 if show is not None:
                     show(n_read)
     return n_written
 
 
-def _with_points(table: pa.Table, schema: pa.Schema) -> pa.Table:
-    """Real numbers as texts, whole ones with a point: who reads "0" in the first rows takes the column for whole numbers."""
-    return pa.table([_texts(c) if pa.types.is_floating(c.type) else c for c in table.columns], schema=schema)
+def _first_line(row: dict[str, Any]) -> str:
+    """The first row of a table in CSV. Its real numbers have a point where Arrow writes "0": by the first rows, programs guess types."""
 
+    def cell(value: Any) -> str:
+        if isinstance(value, str):
+            return '"' + value.replace('"', '""') + '"'
+        return "" if value is None else str(value).lower() if isinstance(value, bool) else repr(value)
 
-def _texts(numbers: pa.ChunkedArray) -> pa.Array:
-    texts = pc.cast(numbers.combine_chunks(), pa.string())
-    is_bare = pc.fill_null(pc.match_substring_regex(texts, "^-?[0-9]+$"), False)
-    return pc.replace_with_mask(texts, is_bare, pc.binary_join_element_wise(texts.filter(is_bare), ".0", ""))
+    return ",".join(map(cell, row.values())) + "\n"
 
 
 def _grouped(batches: Iterator[pa.RecordBatch], schema: pa.Schema, n: int) -> Iterator[pa.Table]:
