@@ -48,7 +48,8 @@ def train(options: TrainOptions) -> int:
     pool = None
     if options.against is not None:
         entries = options.against.split(",")
-        pool = Pool(options.task, task, folder / "pool", entries, options.seed, folder / "policy.onnx")
+        first = folder / "policy.onnx"
+        pool = Pool(options.task, task, folder / "pool", entries, options.seed, first, settings.memory)
         task = pool.task
     with compiling():
         trainer = Trainer(task, options.task, folder, options.seed, settings)

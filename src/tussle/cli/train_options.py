@@ -36,7 +36,8 @@ class TrainOptions(PluginOptions):
         list[str],
         option(
             "NAME=VALUE",
-            "Setting, instead of that of the file: learning_rate=3e-4, entropy=0.01, critic=central, evaluate_every=10. Can be repeated.",
+            "Setting, instead of that of the file: learning_rate=3e-4, entropy=0.01, critic=central, memory=32, evaluate_every=10. Can be "
+            "repeated.",
             "--set",
         ),
     ] = field(default_factory=list)

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from functools import cache, lru_cache
+from math import prod
 from pathlib import Path
 from typing import Any
 
@@ -32,10 +34,31 @@ MAX_MEMORY = 4 * 2**30
 """Memory of the weights and layers of all policies in a process: a few nodes could otherwise ask for any amount."""
 MAX_POLICIES = 64
 """Policies of a folder."""
+MAX_MEMORY_NUMBERS = 2**14
+"""Numbers that an agent keeps: two LSTM layers of 4096 keep as many. A small file could otherwise ask for any amount per entity."""
+
+
+@dataclass(frozen=True)
+class Kept:
+    """An input of a network that gets what an output returned in the decision before.
+
+    Attributes:
+        given: Name of the input; returned: of the output.
+        shape: Shape of one agent's part.
+        axis: Place of the agents among the axes.
+    """
+
+    given: str
+    returned: str
+    shape: tuple[int, ...]
+    axis: int
 
 
 class Policy:
     """An inference session of an ONNX file, which is one network without loops from (n, width) to (n, outputs).
+
+    With more inputs it has memory: each of them gets, in the next decision of the same agent, what the output at the same place
+    among the outputs has returned, and zeros in the first decision.
 
     Args:
         path: The file. Weights in other files are read from its folder only.
@@ -43,6 +66,7 @@ class Policy:
     Attributes:
         task: Name of the task in the metadata, or "".
         width: Numbers of an observation that it takes; n_out: numbers that it returns.
+        n_kept: Numbers that it keeps from one decision of an agent to the next.
 
     Raises:
         MissingExtraError: onnxruntime or onnx is not installed.
@@ -70,19 +94,37 @@ class Policy:
             raise self._refused(f"onnxruntime refuses it: {str(error).splitlines()[0][:200]}") from None
         self._session = session
         self.task = session.get_modelmeta().custom_metadata_map.get(TASK_KEY, "")
-        self.width, self.n_out = self._checked(session.get_inputs()), self._checked(session.get_outputs())
-        self._names = session.get_inputs()[0].name, session.get_outputs()[0].name
+        inputs, outputs = session.get_inputs(), session.get_outputs()
+        if len(inputs) != len(outputs):
+            raise self._refused(
+                f"its inputs are {', '.join(_shown(end) for end in inputs)}, its outputs {', '.join(_shown(end) for end in outputs)}; a "
+                "policy has as many outputs as inputs: the first are observation and action, and what the second output returns is "
+                "given to the second input in the next decision"
+            )
+        self.width, self.n_out = self._columns(inputs[0]), self._columns(outputs[0])
+        self._kept = [self._pair(*ends) for ends in zip(inputs[1:], outputs[1:], strict=True)]
+        self._parts = np.cumsum([0, *(prod(kept.shape) for kept in self._kept)])
+        self.n_kept = int(self._parts[-1])
+        if self.n_kept > MAX_MEMORY_NUMBERS:
+            raise self._refused(
+                f"it keeps {self.n_kept:,} numbers for each agent; at most {MAX_MEMORY_NUMBERS:,} are allowed"
+            )
+        self._observation = inputs[0].name
+        self._returned = [outputs[0].name, *(kept.returned for kept in self._kept)]
         self._check_rows()
 
     def _check_rows(self) -> None:
         """Refuse a network in which a row depends on others, or on chance: a world would depend on its stack."""
-        rows = np.sin(np.arange(BATCH * self.width)).astype(np.float32).reshape(BATCH, self.width)
-        one = self._run(rows)
-        rows[1::2] = 0.0
-        other = self._run(rows)
-        if one.shape != (BATCH, self.n_out) or not np.array_equal(one[::2], other[::2], equal_nan=True):
+        numbers = np.sin(np.arange(BATCH * (self.width + self.n_kept))).astype(np.float32).reshape(BATCH, -1)
+        one = self._run(*np.split(numbers, [self.width], axis=1))
+        numbers[1::2] = 0.0
+        other = self._run(*np.split(numbers, [self.width], axis=1))
+        shapes = (BATCH, self.n_out), (BATCH, self.n_kept)
+        if [found.shape for found in one] != [*shapes] or not all(
+            np.array_equal(a[::2], b[::2], equal_nan=True) for a, b in zip(one, other, strict=True)
+        ):
             raise self._refused(
-                "outputs of a row depend on other rows or on chance; a policy decides for each agent by its observation alone"
+                "outputs of a row depend on other rows or on chance; a policy decides for each agent by what that agent observes and keeps"
             )
 
     def _refused(self, why: str) -> ParameterError:
@@ -124,39 +166,74 @@ class Policy:
             raise self._refused(f"weights cannot be read: {str(error)[:200]}") from None
         return model
 
-    def _checked(self, ends: list[Any]) -> int:
-        """Width of the only input or output."""
-        shapes = [(end.type, end.shape) for end in ends]
-        if len(ends) == 1:
-            kind, shape = shapes[0]
-            if (
-                kind == "tensor(float)"
-                and len(shape) == 2
-                and not isinstance(shape[0], int)
-                and isinstance(shape[1], int)
-            ):
-                return int(shape[1])
+    def _columns(self, end: Any) -> int:
+        """Width of the observation, or of the action."""
+        shape = end.shape
+        if (
+            end.type == "tensor(float)"
+            and len(shape) == 2
+            and not isinstance(shape[0], int)
+            and isinstance(shape[1], int)
+        ):
+            return int(shape[1])
         raise self._refused(
-            f"its inputs or outputs are {str(shapes)[:200]}; a policy has one each, tensor(float) of a free number of rows and a "
-            "fixed number of columns"
+            f"{_shown(end)} is not allowed; observation and action, the first input and output, are each a tensor(float) of a free number "
+            "of rows and a fixed number of columns"
         )
 
-    def __call__(self, obs: np.ndarray) -> np.ndarray:
-        """Outputs of observations, (n, width), as (n, n_out)."""
-        n = len(obs)
-        out = np.empty((n, self.n_out), np.float32)
-        rows = np.zeros((BATCH, self.width), np.float32)
-        for first in range(0, n, BATCH):
-            some = min(BATCH, n - first)
-            rows[:some], rows[some:] = obs[first : first + some], 0.0
-            out[first : first + some] = self._run(rows)[:some]
-        return out
+    def _pair(self, given: Any, returned: Any) -> Kept:
+        """An input after the first and the output at the same place."""
+        free = [axis for axis, n in enumerate(given.shape) if not isinstance(n, int)]
+        sizes = [n for n in given.shape if isinstance(n, int)]
+        if given.type != "tensor(float)" or len(free) != 1 or not sizes or min(sizes) < 1:
+            raise self._refused(
+                f"{_shown(given)} is not allowed; an input that gets what an output returned before is a tensor(float) of which one size, "
+                "the number of agents, is free, and the others are fixed"
+            )
+        if (
+            returned.type != given.type
+            or len(returned.shape) != len(given.shape)
+            or any(isinstance(n, int) and n != m for n, m in zip(returned.shape, given.shape, strict=True))
+        ):
+            raise self._refused(
+                f"what {_shown(returned)} returns does not fit {_shown(given)}, which gets it in the next decision: the input and the "
+                "output at the same place have the same type and sizes"
+            )
+        return Kept(given.name, returned.name, tuple(sizes), free[0])
 
-    def _run(self, rows: np.ndarray) -> Any:
+    def __call__(self, obs: np.ndarray, kept: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Outputs for observations, (n, width), as (n, n_out), and what agents keep, (n, n_kept), of what they have kept."""
+        n = len(obs)
+        out, after = np.empty((n, self.n_out), np.float32), np.empty((n, self.n_kept), np.float32)
+        rows = np.zeros((BATCH, self.width), np.float32)
+        before = np.zeros((BATCH, self.n_kept), np.float32)
+        for first in range(0, n, BATCH):
+            some, part = min(BATCH, n - first), slice(first, first + BATCH)
+            rows[:some], rows[some:], before[:some], before[some:] = obs[part], 0.0, kept[part], 0.0
+            out[part], after[part] = (found[:some] for found in self._run(rows, before))
+        return out, after
+
+    def _run(self, rows: np.ndarray, before: np.ndarray) -> tuple[Any, Any]:
+        given = {self._observation: np.ascontiguousarray(rows)}
+        for kept, first, last in zip(self._kept, self._parts, self._parts[1:], strict=False):
+            part = before[:, first:last].reshape(BATCH, *kept.shape)
+            given[kept.given] = np.ascontiguousarray(np.moveaxis(part, 0, kept.axis))
         try:
-            return self._session.run([self._names[1]], {self._names[0]: rows})[0]
+            out, *after = self._session.run(self._returned, given)
         except Exception as error:  # noqa: BLE001 - the runtime has a class for each of its codes
             raise self._refused(f"onnxruntime cannot apply it: {str(error).splitlines()[0][:200]}") from None
+        for part, kept in zip(after, self._kept, strict=True):
+            if part.shape != given[kept.given].shape:
+                raise self._refused(
+                    f"its output {kept.returned!r} returns {part.shape}, and its input {kept.given!r} takes {given[kept.given].shape}"
+                )
+        parts = [np.moveaxis(part, kept.axis, 0) for part, kept in zip(after, self._kept, strict=True)]
+        return out, np.concatenate([before[:, :0], *(part.reshape(BATCH, -1) for part in parts)], axis=1)
+
+
+def _shown(end: Any) -> str:
+    """Name, type and sizes of an input or output; None is a free size."""
+    return f"{end.name!r:.60} {end.type} {end.shape!s:.100}"
 
 
 @cache
@@ -192,10 +269,12 @@ class LearnedFlight:
 
     Attributes:
         channels: Channels that they set.
+        n_kept: Numbers that an agent keeps from one decision to the next, with the policy that keeps most.
     """
 
     def __init__(self, policies: Sequence[Policy], task: Task, name: str, block: str) -> None:
         self.policies, self.task = policies, task
+        self.n_kept = max(policy.n_kept for policy in policies)
         self._draw = rng.stream_key("Learned", name)
         blocks = {b.name: b for b in task.blocks}
         if block not in blocks and (block or len(blocks) > 1):
@@ -228,8 +307,8 @@ class LearnedFlight:
                 f"Learned: {name} has {what} of several blocks; give each block its own task"
             )
 
-    def decide(self, g: GroupView, columns: Mapping[str, np.ndarray]) -> None:
-        """Set the channels of the rows whose decision is due, by name."""
+    def decide(self, g: GroupView, columns: Mapping[str, np.ndarray], memory: np.ndarray) -> None:
+        """Set the channels of the rows whose decision is due, by name, and what they keep, (numbers, n)."""
         simulation = g.context.simulation()
         interval = self.task.given.dt * self.task.decide_every
         every = round(interval / simulation.mission.dt)
@@ -245,10 +324,17 @@ class LearnedFlight:
         g.context.has_chance |= len(self.policies) > 1
         share = rng.uniform(g.context.seeds, self._draw, 0, 0)[0]
         which = (share * len(self.policies)).astype(int)[g.world[due]]
+        if len(memory) != max(1, self.n_kept):
+            raise ParameterError(
+                f"Learned.policy = {self.policies[0].path!r} was replaced by one that keeps another number of values, {self.n_kept} "
+                f"instead of {len(memory)}; make a new simulation"
+            )
         obs, allowed = (each[due] for each in self.observe(simulation, g))
-        out = np.empty((len(due), self.policies[0].n_out), np.float32)
+        out, kept = np.empty((len(due), self.policies[0].n_out), np.float32), memory[:, due].T
         for k in np.unique(which):
-            out[which == k] = self.policies[k](obs[which == k])
+            policy, mine = self.policies[k], np.flatnonzero(which == k)
+            out[mine], kept[mine, : policy.n_kept] = policy(obs[mine], kept[mine, : policy.n_kept])
+        memory[:, due] = kept.T
         if not self._decoder.is_continuous:
             edges = np.cumsum(self._decoder.sizes)[:-1]
             stuck = np.flatnonzero([~free.any(axis=1) for free in np.split(allowed, edges, axis=1)])
@@ -264,6 +350,10 @@ class LearnedFlight:
         if wrong >= 0:
             path = self.policies[which[wrong]].path
             g.fail(int(due[wrong]), f"the policy {path} returned a value that is not a number")
+        lost = np.flatnonzero(~np.isfinite(kept).all(axis=1))
+        if len(lost):
+            path = self.policies[which[lost[0]]].path
+            g.fail(int(due[lost[0]]), f"the policy {path} keeps a value that is not a finite number")
 
     def observe(self, simulation: Any, g: GroupView) -> tuple[np.ndarray, np.ndarray]:
         """Observations of all rows, (n, numbers), and which levels they may choose, (n, levels): the task computes them, as in a swarm."""

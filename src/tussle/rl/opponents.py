@@ -7,6 +7,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from tussle.documents import is_count
 from tussle.errors import ParameterError, listed
 from tussle.folders import real_path
@@ -76,6 +78,7 @@ class Pool:
         entries: Each "latest", "past", an ONNX file, or a folder, which stands for all its files; "=3" after it makes three slots.
         seed: Of the sample of past policies.
         first: Policy of the slots of the latest and past ones at first; one that does nothing where the file does not exist.
+        memory: Numbers that the learners' policy keeps from one decision to the next.
 
     Attributes:
         task: The task, in which the pool plays the other side.
@@ -85,7 +88,14 @@ class Pool:
     """
 
     def __init__(
-        self, name: str, task: Task, folder: Path, entries: Sequence[str], seed: int, first: Path
+        self,
+        name: str,
+        task: Task,
+        folder: Path,
+        entries: Sequence[str],
+        seed: int,
+        first: Path,
+        memory: int = 0,
     ) -> None:
         other = other_side(name, task)
         self._name, self._seed = name, seed
@@ -110,11 +120,16 @@ class Pool:
             elif not file.exists():
                 decoder, width = other.decoders[0], sum(other.widths[other.blocks[0].name])
                 n_out = len(decoder.free) if decoder.is_continuous else int(decoder.sizes.sum())
-                write_policy(file, [([[0.0] * width] * n_out, [0.0] * n_out)], task=name)
+                last = memory or width
+                layers: list[tuple[Any, ...]] = [(np.zeros((n_out, last)), np.zeros(n_out))]
+                if memory:
+                    sizes = (3 * memory, width), (3 * memory, memory), (3 * memory,), (3 * memory,)
+                    layers.insert(0, tuple(map(np.zeros, sizes)))
+                write_policy(file, layers, task=name)
         mission = with_policy(task.given, task.opponents, other, real_path(folder))
         self.task = task.replace(mission=mission, overrides={})
 
-    def add(self, layers: Sequence[tuple[Any, Any]], n_updates: int) -> None:
+    def add(self, layers: Sequence[tuple[Any, ...]], n_updates: int) -> None:
         """Take the learners' policy into the pool.
 
         Args:

@@ -28,6 +28,8 @@ class Settings:
         epochs: Passes over these in an update.
         minibatch: Decisions per gradient step.
         hidden: Width of both hidden layers.
+        memory: Numbers that an agent keeps from one decision to the next, in a recurrent unit in place of the second hidden layer; 0
+            for none.
         learning_rate: Of Adam at the beginning; it falls linearly with time to a tenth.
         discount: Weight of a reward one decision later.
         trace: Weight of an advantage estimate that looks one decision further, lambda.
@@ -46,6 +48,7 @@ class Settings:
     epochs: int = 4
     minibatch: int = 4096
     hidden: int = 64
+    memory: int = 0
     learning_rate: float = 1e-3
     discount: float = 0.99
     trace: float = 0.95
@@ -59,7 +62,7 @@ class Settings:
         for name, value in asdict(self).items():
             least = (
                 0
-                if name in ("entropy", "evaluate_every", "discount", "trace")
+                if name in ("entropy", "evaluate_every", "discount", "trace", "memory")
                 else 1
                 if type(value) is int
                 else 1e-12

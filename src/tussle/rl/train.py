@@ -2,17 +2,17 @@
 
 The objective is that of Schulman, Wolski, Dhariwal, Radford and Klimov (2017), equation 7, with the generalized advantage estimates of
 Schulman, Moritz, Levine, Jordan and Abbeel (2016), equation 16. Each agent observes, decides and is rewarded by itself; critic and
-policy share no layers. With `critic = "central"` the critic sees the state of the world as well (MAPPO: Yu and others 2022).
+policy share no layers. With `critic = "central"` the critic sees the state of the world as well (MAPPO: Yu and others 2022). With
+`memory` both have a gated recurrent unit (Cho and others 2014), and minibatches consist of the whole sequences of some agents.
 """
 
 from __future__ import annotations
 
 import csv
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Callable
+from dataclasses import asdict
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from tussle.notebook_bar import Show, notebook_bar
 from tussle.rl.actor_critic import ActorCritic
 from tussle.rl.evaluation import interval, play_episodes
 from tussle.rl.policy_file import kept_file, write_policy
+from tussle.rl.rollout import Decisions, Role, Rollout, check_finite
 from tussle.rl.settings import Settings
 from tussle.rl.swarm import Swarm
 from tussle.rl.task import Task
@@ -35,144 +36,6 @@ CURVE = ("minutes", "decisions", "episodes", "episode_return", "reward_per_decis
 """Columns of curve.csv."""
 EVALUATIONS = ("minutes", "decisions", "episodes", "episode_return", "low", "high")
 """Columns of evaluations.csv; low and high are the ends of the 95 % confidence interval of the mean."""
-
-
-@dataclass
-class Decisions:
-    """Decisions of living agents side by side, (m, ...); `states` are those of the worlds, of which `place` is the row, (m,)."""
-
-    obs: Any
-    actions: Any
-    log_prob: Any
-    advantages: Any
-    returns: Any
-    place: Any
-    mask: Any
-    states: Any
-
-    def seen(self, some: Any) -> Any:
-        """What the critic sees of some decisions."""
-        return (
-            self.obs[some]
-            if self.states is None
-            else torch.cat([self.obs[some], self.states[self.place[some]]], -1)
-        )
-
-
-def check_finite(what: str, values: Any) -> None:
-    """Refuse what would make all weights NaN.
-
-    Raises:
-        ParameterError: A number is not finite.
-    """
-    if not torch.isfinite(values).all():
-        raise ParameterError(
-            f"{what} is not a finite number of single precision; scale observations and rewards to about 1, or lower learning_rate"
-        )
-
-
-class Role:
-    """Policy and critic of some blocks, and what their agents see.
-
-    Args:
-        swarm: The worlds.
-        blocks: Names of the blocks, which observe and decide in the same form.
-        settings: Of PPO.
-    """
-
-    def __init__(self, swarm: Swarm, blocks: Sequence[str], settings: Settings) -> None:
-        task = swarm.task
-        numbers = [i for i, block in enumerate(task.blocks) if block.name in blocks]
-        self.agents = np.flatnonzero(np.isin(task.agent_block, numbers))
-        self.width, decoder = sum(task.widths[blocks[0]]), task.decoders[numbers[0]]
-        self.is_central = settings.critic == "central"
-        sizes = () if decoder.is_continuous else tuple(int(n) for n in decoder.sizes)
-        self.n_actions = len(decoder.free)
-        n_state = swarm.central_state.shape[1] if self.is_central else 0
-        self.model = ActorCritic(
-            self.width, sizes, self.n_actions if not sizes else 0, settings.hidden, n_state
-        )
-        self.optimizer = torch.optim.Adam(self.model.parameters, lr=settings.learning_rate, eps=1e-5)
-
-    def of(self, array: np.ndarray) -> Any:
-        """Values of the agents of this role, (W, A, ...), as (m, ...)."""
-        mine = np.ascontiguousarray(array[:, self.agents])
-        return torch.from_numpy(mine.reshape(-1, *mine.shape[2:]))
-
-    def obs(self, array: np.ndarray) -> Any:
-        return self.of(array)[:, : self.width].float()
-
-    def mask(self, swarm: Swarm) -> Any:
-        return None if swarm.masks is None else self.of(swarm.masks)[:, : sum(self.model.sizes)]
-
-    def seen(self, obs: Any, states: np.ndarray) -> Any:
-        """What the critic sees, (m, n), with the states of the worlds, (W, n)."""
-        if not self.is_central:
-            return obs
-        return torch.cat(
-            [obs, torch.from_numpy(states.astype(np.float32)).repeat_interleave(len(self.agents), 0)], -1
-        )
-
-
-class Rollout:
-    """What the agents of a role see, do and get in T decisions, (T, m, ...)."""
-
-    def __init__(self, role: Role, swarm: Swarm, n: int) -> None:
-        self.role, self.swarm, m = role, swarm, swarm.n_worlds * len(role.agents)
-        self.obs = torch.zeros(n, m, role.width)
-        kind = torch.long if role.model.sizes else torch.float32
-        self.actions = torch.zeros(n, m, role.n_actions, dtype=kind)
-        self.log_prob, self.rewards, self.values, self.later, self.goes_on, self.alive = torch.zeros(6, n, m)
-        self.mask = None if swarm.masks is None else torch.ones(n, m, sum(role.model.sizes), dtype=torch.bool)
-        self.states = torch.zeros(n, *swarm.central_state.shape) if role.is_central else None
-
-    def decide(self, t: int) -> np.ndarray:
-        """Draw actions, (W, agents, n)."""
-        role, swarm, model = self.role, self.swarm, self.role.model
-        self.obs[t], self.alive[t], mask = role.obs(swarm.obs), role.of(swarm.alive).float(), None
-        check_finite("an observation", self.obs[t])
-        if self.mask is not None:
-            mask = self.mask[t] = role.mask(swarm)
-        if self.states is not None:
-            self.states[t] = torch.from_numpy(swarm.central_state.astype(np.float32))
-        with torch.no_grad():
-            distributions = model.distributions(self.obs[t], mask)
-            drawn = [d.sample() for d in distributions]
-            self.actions[t] = torch.stack(drawn, -1) if model.sizes else drawn[0]
-            self.log_prob[t] = model.log_prob(distributions, self.actions[t])
-            self.values[t] = model.critic(role.seen(self.obs[t], swarm.central_state))[:, 0]
-        return np.asarray(self.actions[t].numpy().reshape(swarm.n_worlds, len(role.agents), -1))
-
-    def note(self, t: int) -> None:
-        """Note what followed; a truncated episode would go on."""
-        role, swarm = self.role, self.swarm
-        over, terminated = swarm.over, role.of(swarm.terminations)
-        self.rewards[t] = role.of(swarm.rewards).float()
-        next_obs = role.obs(np.where(over[:, None, None], swarm.final_obs, swarm.obs))
-        states = (
-            np.where(over[:, None], swarm.final_central_state, swarm.central_state)
-            if role.is_central
-            else over
-        )
-        with torch.no_grad():
-            self.later[t] = role.model.critic(role.seen(next_obs, states))[:, 0]
-        self.later[t] *= (~terminated).float()
-        self.goes_on[t] = (~(terminated | torch.from_numpy(over).repeat_interleave(len(role.agents)))).float()
-
-    def decisions(self, discount: float, trace: float) -> Decisions:
-        """The decisions of the living, with their advantages."""
-        advantages, last = torch.zeros_like(self.rewards), torch.zeros_like(self.rewards[0])
-        for t in reversed(range(len(advantages))):
-            delta = self.rewards[t] + discount * self.later[t] - self.values[t]
-            last = advantages[t] = delta + discount * trace * self.goes_on[t] * last
-        there, n_worlds = self.alive.bool(), self.swarm.n_worlds
-        time, agent = there.nonzero(as_tuple=True)
-        place = time * n_worlds + agent // len(self.role.agents)
-        return Decisions(
-            self.obs[there], self.actions[there], self.log_prob[there], advantages[there],
-            (advantages + self.values)[there], place, None if self.mask is None else self.mask[there],
-            None if self.states is None else self.states.flatten(0, 1),
-        )  # fmt: skip
 
 
 class Trainer:
@@ -218,6 +81,8 @@ class Trainer:
         """Start episodes, and play world k of W for the share k / W of one, so that an update has decisions from all its phases."""
         swarm = self.swarm
         swarm.reset(seed)
+        for role in self.roles.values():
+            role.kept.clear()
         idle = self._idle(swarm)
         n = self.task.n_steps // self.task.decide_every
         begins = n - n * np.arange(swarm.n_worlds) // swarm.n_worlds
@@ -258,9 +123,13 @@ class Trainer:
         """The most likely actions, (W, A, n)."""
         actions = self._idle(swarm)
         for role in self.roles.values():
+            before, _ = role.carried(swarm)
             with torch.no_grad():
-                chosen = role.model.most_likely(role.obs(swarm.obs), role.mask(swarm)).numpy()
-            actions[:, role.agents, : role.n_actions] = chosen.reshape(len(actions), len(role.agents), -1)
+                chosen, role.kept[swarm] = role.model.most_likely(
+                    role.obs(swarm.obs), before, role.mask(swarm)
+                )
+            chosen = chosen.numpy().reshape(len(actions), len(role.agents), -1)
+            actions[:, role.agents, : role.n_actions] = chosen
         return actions
 
     def evaluate(self) -> np.ndarray:
@@ -275,17 +144,21 @@ class Trainer:
         for group in role.optimizer.param_groups:
             group["lr"] = s.learning_rate * (1.0 - 0.9 * share)
         for _ in range(s.epochs):
-            for some in torch.randperm(len(batch.log_prob)).split(s.minibatch):
+            for some in torch.randperm(len(batch.log_prob)).split(
+                max(1, s.minibatch // batch.log_prob[0].numel())
+            ):
                 mask = None if batch.mask is None else batch.mask[some]
-                distributions = model.distributions(batch.obs[some], mask)
-                ratio = (model.log_prob(distributions, batch.actions[some]) - batch.log_prob[some]).exp()
-                gain = batch.advantages[some]
+                there, memory = batch.there[some], (batch.start[some], batch.begins[some])
+                distributions, _ = model.distributions(batch.obs[some], mask, *memory)
+                log_prob = model.log_prob(distributions, batch.actions[some])
+                ratio = (log_prob - batch.log_prob[some])[there].exp()
+                gain = batch.advantages[some][there]
                 gain = (gain - gain.mean()) / (gain.std(correction=0) + 1e-8)
                 clipped = ratio.clamp(1.0 - s.clip, 1.0 + s.clip)
-                value = model.critic(batch.seen(some))[:, 0]
-                entropy = sum(d.entropy().mean() for d in distributions)
+                value = model.value(batch.seen(some), *memory)[0][there]
+                entropy = sum(d.entropy()[there].mean() for d in distributions)
                 loss = -torch.minimum(gain * ratio, gain * clipped).mean() - s.entropy * entropy
-                loss = loss + 0.5 * (value - batch.returns[some]).square().mean()
+                loss = loss + 0.5 * (value - batch.returns[some][there]).square().mean()
                 check_finite("the loss", loss)
                 role.optimizer.zero_grad()
                 loss.backward()
@@ -376,7 +249,7 @@ class Trainer:
         path = self.folder / "checkpoint.pt"
         try:
             state = torch.load(path, weights_only=True)
-            known = state["task"], state["settings"]
+            known = state["task"], {**asdict(Settings()), **state["settings"]}  # of a former version
         except FileNotFoundError:
             raise ParameterError(f"{path} does not exist; train without --resume first") from None
         except Exception:  # noqa: BLE001 - of zip files, pickles and PyTorch

@@ -93,8 +93,8 @@ def test_policies_of_either_side_play_where_all_learn():
             for _ in range(300):
                 for policy, who in sides:
                     seen = obs[:, who, : policy.width]
-                    out = policy(seen.reshape(-1, policy.width)).clip(-1.0, 1.0)
-                    actions[:, who] = out.reshape(*seen.shape[:2], -1)
+                    out, _ = policy(seen.reshape(-1, policy.width), np.zeros((seen[..., 0].size, 0)))
+                    actions[:, who] = out.clip(-1.0, 1.0).reshape(*seen.shape[:2], -1)
                 obs, *_ = swarm.step(actions)
                 n_captures += swarm.terms["captures"].sum()
                 assert swarm.terms["captures"].sum() == -swarm.terms["captured"].sum()

@@ -134,3 +134,16 @@ def test_red_sees_and_flies_the_field_reflected_in_its_centre(tmp_path):
             np.testing.assert_allclose(a - centre, centre - b, atol=1e-3)
             vel = simulation.read(f"blue_{role}.vel")[0]
             assert np.abs(vel).max() > 1.0
+
+
+def test_a_pool_of_policies_with_memory_goes_on_while_it_is_played(chase, tmp_path):
+    """The first policy does nothing, and keeps as many numbers as those that replace it."""
+    pool = Pool("test/Chase-v0", chase, tmp_path / "pool", ["latest"], 1, tmp_path / "none.onnx", memory=2)
+    sizes = (6, WIDTH), (6, 2), (6,), (6,)
+    unit = tuple(np.full(size, 3.0) for size in sizes)
+    with Simulation(pool.task.played, seeds=[1]) as simulation:
+        simulation.step(3)
+        assert np.abs(simulation.read("blue.Learned.memory")[0]).max() == 0.0
+        pool.add([unit, (np.ones((2, 2)), np.zeros(2))], 1)
+        simulation.step(3)
+        assert np.abs(simulation.read("blue.Learned.memory")[0]).max() > 0.0

@@ -45,6 +45,7 @@ def test_settings_are_read_from_files_and_texts(tmp_path):
         ({"worlds": 2.5}, "worlds = 2.5 is not allowed; it takes a whole number"),
         ({"worlds": "many"}, "worlds = 'many' is not allowed; it takes a whole number"),
         ({"clip": True}, "clip = True is not allowed; it takes a number"),
+        ({"memory": -1}, "memory = -1 is not allowed; it takes a number from 0"),
         ({"worlds": 0}, "worlds = 0 is not allowed; it takes a number from 1"),
         ({"discount": 1.5}, "discount = 1.5 is not allowed; it takes a number from 0 to 1"),
         ({"learning_rate": "nan"}, "learning_rate = nan is not allowed"),
@@ -191,10 +192,11 @@ def test_evaluations_have_intervals_and_do_not_change_the_training(trainer_of, t
     np.testing.assert_allclose(plain.model.layers()[0][0], weights, atol=1e-4)
 
 
+@pytest.mark.parametrize("memory", [0, 5])
 @pytest.mark.parametrize("task", [PreyEscape(time_limit=4.0), Dispersal(time_limit=20.0)])
-def test_the_best_and_the_worst_episode_are_those_of_the_evaluation(task, trainer_of, tmp_path):
+def test_the_best_and_the_worst_episode_are_those_of_the_evaluation(task, memory, trainer_of, tmp_path):
     """To the last bit, though they are played alone: with actions in ranges, and with levels and masks, where all games are alike."""
-    trainer = trainer_of(task, evaluate_episodes=7)
+    trainer = trainer_of(task, evaluate_episodes=7, memory=memory)
     trainer.train(1e-9, lambda line: False)
     returns = trainer.evaluate()
     assert len(set(returns)) == (1 if task.has_mask else 7)

@@ -36,6 +36,11 @@ def team_policy(path, n_in=WIDTH, n_out=2, task="tussle/PredatorTeam-v0", width=
     return str(path)
 
 
+def decided(policy, obs):
+    """Outputs of a policy without memory."""
+    return policy(obs, np.zeros((len(obs), 0)))[0]
+
+
 def with_policy(mission, owner, **values):
     """The mission, in which a policy flies a block beside the autonomies that the task keeps."""
     blocks = [
@@ -50,7 +55,7 @@ def test_a_policy_flies_as_in_the_swarm_of_its_task(tmp_path):
     swarm = make_swarm(task, 2)
     obs = swarm.reset(seed=5)
     for _ in range(40):
-        obs, *_ = swarm.step(policy(obs.reshape(-1, WIDTH)).reshape(2, 5, 2))
+        obs, *_ = swarm.step(decided(policy, obs.reshape(-1, WIDTH)).reshape(2, 5, 2))
     mission = with_policy(task.given, "switchers", policy=path)
     with Simulation(pickle.loads(pickle.dumps(mission)), seeds=[5, 6]) as simulation:
         simulation.step(80)
@@ -100,7 +105,7 @@ def test_a_policy_keeps_to_the_mask_of_its_task(tmp_path):
     swarm, policy = make_swarm(task, 2), Policy(path)
     obs, n_excluded = swarm.reset(seed=5), 0
     for _ in range(30):
-        scores = policy(obs.reshape(-1, obs.shape[-1]))
+        scores = decided(policy, obs.reshape(-1, obs.shape[-1]))
         free = scores.argmax(axis=1)
         scores[~swarm.masks.reshape(-1, 5)] = -np.inf
         n_excluded += (scores.argmax(axis=1) != free).sum()
@@ -141,11 +146,11 @@ def test_worlds_are_the_same_in_any_stack(tmp_path):
 def test_a_row_does_not_depend_on_its_batch(tmp_path, width):
     policy = Policy(team_policy(tmp_path / "p.onnx", n_in=33, n_out=7, width=width))
     obs = np.random.default_rng(1).normal(0, 2, (150, 33)).astype(np.float32)
-    together = policy(obs)
+    together = decided(policy, obs)
     order = np.random.default_rng(2).permutation(150)
-    np.testing.assert_array_equal(policy(obs[order]), together[order])
+    np.testing.assert_array_equal(decided(policy, obs[order]), together[order])
     for row in range(0, 150, 7):
-        np.testing.assert_array_equal(policy(obs[row : row + 1])[0], together[row])
+        np.testing.assert_array_equal(decided(policy, obs[row : row + 1])[0], together[row])
 
 
 def test_levels_are_chosen_by_the_greatest_output_and_computed_observations_are_the_tasks(tmp_path):
@@ -205,7 +210,9 @@ def test_files_that_are_no_policies_are_refused(tmp_path):
     relu = [helper.make_node("Relu", ["a"], ["b"])]
     for shape in (("n", 2, 3), (7, 2), ("n", "m")):
         save(path, relu, [end("a", *shape)], [end("b", *shape)])
-        with pytest.raises(ParameterError, match=r"one each, tensor\(float\) of a free number of rows"):
+        with pytest.raises(
+            ParameterError, match=r"'a' tensor\(float\) .* each a tensor\(float\) of a free number"
+        ):
             Policy(str(path))
     save(path, [helper.make_node("Nonsense", ["a"], ["b"])], [end("a", "n", 2)], [end("b", "n", 2)])
     with pytest.raises(ParameterError, match=r"x.onnx': onnxruntime refuses it"):
@@ -256,7 +263,7 @@ def test_weights_in_other_files_are_read_from_the_same_folder_only(tmp_path):
         model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)], ir_version=8)
         path.write_bytes(model.SerializeToString())
         if is_allowed:
-            assert Policy(str(path))(np.array([[3.0, 4.0]])).tolist() == [[3.0, 4.0]]
+            assert decided(Policy(str(path)), np.array([[3.0, 4.0]])).tolist() == [[3.0, 4.0]]
         else:
             with pytest.raises(ParameterError, match=r"x.onnx': weights in .*w.bin' are not allowed"):
                 Policy(str(path))

@@ -6,7 +6,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from tussle.api import Autonomy, GroupView, Output, Param
+from tussle.api import Autonomy, GroupView, Output, Param, State
 from tussle.api.channels import CHANNEL_UNITS
 from tussle.plugins import stock
 
@@ -30,6 +30,9 @@ class Learned(Autonomy):
     policy decides in each `decide_every` steps of the task's mission; outputs stay in between. Parameters that the task holds
     constant are those of this mission; channels that no action sets are 0, unless the task keeps other autonomies.
 
+    A policy with memory has further inputs and outputs: what an output returns is given to the input at the same place in the next
+    decision of the same entity. Each entity begins with zeros.
+
     One inference serves all entities of all worlds, in batches of a fixed size, so that results do not depend on the stack; they may
     differ between machines. It needs `pip install 'tussle[policy,rl]'`.
     """
@@ -47,6 +50,7 @@ class Learned(Autonomy):
     block = Param(
         "", doc="Block of the task whose observations and actions are used; by default its only one."
     )
+    memory = State(doc="What the policy keeps from one decision to the next.")
     for _channel, _unit in CHANNEL_UNITS.items():
         vars()[_channel] = Output(unit=_unit, doc="Command.")
 
@@ -59,5 +63,15 @@ class Learned(Autonomy):
         """Return the channels that the actions of the task set."""
         return list(self._flight().channels)
 
+    def state_size(self, name: str) -> int:
+        """Return the number of values that the policy keeps for an entity, or 1 if it keeps none."""
+        n: int = self._flight().n_kept
+        return max(1, n)
+
+    def unused_states(self) -> tuple[str, ...]:
+        """Return the memory, if the policy has none."""
+        return () if self._flight().n_kept else ("memory",)
+
     def step(self, g: GroupView) -> None:
-        self._flight().decide(g, {name: getattr(self, name) for name in self.offered_outputs()})
+        flight = self._flight()
+        flight.decide(g, {name: getattr(self, name) for name in flight.channels}, self.memory)
