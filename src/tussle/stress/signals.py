@@ -7,7 +7,7 @@ import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -29,8 +29,7 @@ MAX_CLEARANCE = 100.0
 """Clearances are measured up to here [m]; beyond they are this far."""
 
 
-@dataclass(frozen=True)
-class ChosenEntities:
+class ChosenEntities(NamedTuple):
     """Entities that a signal is about.
 
     Attributes:
