@@ -17,6 +17,7 @@ from tussle.plugins import stock
 from tussle.stock import (
     GPS,
     ActuatorFault,
+    Boundary,
     ClockOffset,
     FailingRadio,
     GoToWaypoint,
@@ -205,6 +206,40 @@ def test_what_a_fault_does(fault, expected):
         seen.append([float(sim.read(f"a.ActuatorFault.{n}_out")[0].ravel()[0]) for n in names])
     assert [row[0] for row in seen] == expected
     assert [row[1:] for row in seen] == [[k, k] for k in range(6)]
+
+
+@pytest.mark.parametrize("fault", ["bias", "reverse", "delay"])
+def test_a_measurement_that_is_kept_is_altered_once(fault):
+    """Without a fix, GPS keeps what it wrote last."""
+    fence = Boundary(boundary_id=1, center=(0, 0, 0), lengths=(100, 100, 100))
+    fault = SensorFault(
+        channels="gps_fix gps_altitude gps_time",
+        fault=fault,
+        value=5.0,
+        delay=2,
+        start_after=0.45,
+        duration=0.3,
+    )
+    seen = []
+    for faults in ([], [fault]):
+        block = Block(name="a", position=(47, 0, 10), autonomy=driver(["velocity_x", "velocity_y", "velocity_z"], 0.0),
+                      motion=SingleIntegrator(), sensor=[GPS(gps_denied_ids="1", noise=(0, 0, 0)), *faults])  # fmt: skip
+        sim = Simulation(Mission(blocks=[block], interactions=[fence], dt=0.1, end=2), 1)
+        found = []
+        for _ in range(12):
+            sim.step()
+            found.append(
+                [sim.read("a.GPS.coordinates")[0][0, 0, 2], sim.read("a.GPS.gps_time")[0].ravel()[0]]
+            )
+        seen.append(np.array(found))
+    right, wrong = seen
+    assert len(set(right[:, 1])) > 2
+    assert (right[1:4, 1] == right[0, 1]).all()
+    faulty = slice(4, 7)
+    expected = right.copy()
+    kind = fault.values["fault"]
+    expected[faulty] = {"bias": right[faulty] + 5.0, "reverse": -right[faulty], "delay": right[2:5]}[kind]
+    assert np.array_equal(wrong, expected)
 
 
 def test_a_belief_that_is_late():

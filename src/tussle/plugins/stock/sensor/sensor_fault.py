@@ -13,6 +13,8 @@ from tussle.errors import ParameterError, listed, nearest_name
 
 MEMORY = "freeze", "delay"
 """Faults that need what was measured before."""
+KEPT = "gps_latitude", "gps_longitude", "gps_altitude", "gps_time"
+"""Numbers that a sensor does not write in each call: GPS keeps those of its last fix."""
 ATTITUDE = tuple(f"belief_quat_{i}" for i in "wxyz")
 FIXED = ("id", "team", "kind", "solid", "qw", "qx", "qy", "qz")
 """Fields of lists that are no measured numbers, or not alone."""
@@ -52,6 +54,8 @@ class SensorFault(ChannelFault, Sensor):
     fields = Param("", doc="Fields of the list that are altered.")
     past_items = State(ragged=True, doc="Items of the list in calls before: how many calls ago, and fields.")
     n_calls = State(dtype=int, doc="Number of calls, for delayed lists.")
+    measured = State(doc="Last measurements of numbers that a sensor may keep.")
+    written = State(doc="What was written instead of them.")
     for _channel, _unit in MEASURED_CHANNELS.items():
         vars()[_channel] = Output(unit=_unit, doc="Measurement.")
     for _channel, (_fields, _unit) in MEASURED_LISTS.items():
@@ -90,7 +94,15 @@ class SensorFault(ChannelFault, Sensor):
         has_list = len(self.numbers()) < len(self.offered_outputs())
         of_lists = {"past_items": MEMORY, "n_calls": ("delay",)}
         unused = [n for n, faults in of_lists.items() if not has_list or self.values["fault"] not in faults]
-        return *super().unused_states(), *unused
+        return *super().unused_states(), *unused, *(() if self._kept() else ("measured", "written"))
+
+    def state_size(self, name: str) -> int:
+        """Return the number of components: one per channel that a sensor may keep."""
+        return max(1, len(self._kept())) if name in ("measured", "written") else super().state_size(name)
+
+    def _kept(self) -> list[int]:
+        """Places of the numbers that a sensor may keep."""
+        return [i for i, name in enumerate(self.numbers()) if name in KEPT]
 
     def offered_outputs(self) -> list[str]:
         """Return the channels that are altered."""
@@ -100,8 +112,15 @@ class SensorFault(ChannelFault, Sensor):
         """Alter the measurements."""
         begins, numbers = self.begin(g), self.numbers()
         if numbers:
-            columns = [getattr(self, name) for name in numbers]
-            for column, row in zip(columns, self.altered(begins, np.array(columns)), strict=True):
+            columns, kept = [getattr(self, name) for name in numbers], self._kept()
+            true = np.array(columns)
+            if kept:  # a measurement that the sensor has kept is altered already
+                is_kept = true[kept] == self.written
+                self.measured[:] = true[kept] = np.where(is_kept, self.measured, true[kept])
+            altered = self.altered(begins, true)
+            if kept:
+                self.written[:] = altered[kept]
+            for column, row in zip(columns, altered, strict=True):
                 column[:] = row
         for name in self.offered_outputs():
             if name in MEASURED_LISTS:
