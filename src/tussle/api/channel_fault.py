@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection
 from functools import cache
 from typing import Any
 
 import numpy as np
 
-from tussle.api.group import GroupView
+from tussle.api.channels import MEASURED_LISTS
 from tussle.api.timed_fault import TimedFault
 from tussle.declare.columns import Param, State
 from tussle.errors import ParameterError, listed, nearest_name
@@ -35,7 +35,7 @@ class ChannelsParam(Param):
         doc: One-line description.
     """
 
-    def __init__(self, default: str, known: Mapping[str, str], *, at_least: int = 1, doc: str = "") -> None:
+    def __init__(self, default: str, known: Collection[str], *, at_least: int = 1, doc: str = "") -> None:
         self.known, self.at_least = tuple(known), at_least
         super().__init__(default, doc=doc)
 
@@ -76,13 +76,17 @@ class ChannelFault(TimedFault):
     past = State(doc="Values of the last calls, newest first, for delayed ones.")
     has_past = State(dtype=bool, doc="Whether there was a call.")
 
+    def numbers(self) -> list[str]:
+        """Return the channels that are numbers."""
+        return [name for name in channel_names(self.values["channels"]) if name not in MEASURED_LISTS]
+
     def state_size(self, name: str) -> int:
         """Return the number of components: one value per channel is held, and of delayed ones those of all calls."""
-        k = len(channel_names(self.values["channels"]))
+        k = len(self.numbers())
         if name == "held":
-            return k if self.values["fault"] == "freeze" else 1
+            return max(k, 1) if self.values["fault"] == "freeze" else 1
         if name == "past":
-            return k * self.values["delay"] if self.values["fault"] == "delay" else 1
+            return max(k * self.values["delay"], 1) if self.values["fault"] == "delay" else 1
         return super().state_size(name)
 
     def unused_states(self) -> tuple[str, ...]:
@@ -90,23 +94,24 @@ class ChannelFault(TimedFault):
         unused = {"held": "freeze", "past": "delay", "has_past": "delay"}
         return tuple(name for name, fault in unused.items() if self.values["fault"] != fault)
 
-    def altered(self, g: GroupView, true: np.ndarray) -> np.ndarray:
-        """Advance the fault by a call, and return what becomes of the values of the channels, (k, n)."""
-        begins = self.begin(g)
+    def altered(self, begins: np.ndarray, true: np.ndarray) -> np.ndarray:
+        """Return what becomes of the values of the channels in a call, (k, n); in rows `begins`, (n,), the fault begins."""
         if self.fault == "freeze":
             self.held[:, begins] = true[:, begins]
             wrong = self.held
         elif self.fault == "delay":
             wrong = self._remember(true)
-        elif self.fault == "bias":
-            wrong = true + self.value
-        elif self.fault == "saturate":
-            wrong = clip(true, -np.abs(self.value), np.abs(self.value))
-        elif self.fault == "reverse":
-            wrong = -true
         else:
-            wrong = np.broadcast_to(self.value, true.shape)
+            wrong = self.wrong(true, self.value)
         return np.where(self.is_faulty, wrong, true)
+
+    def wrong(self, true: np.ndarray, value: np.ndarray) -> np.ndarray:
+        """What a fault without memory makes of true values, (..., m); `value`, (m,), is that of each."""
+        if self.fault == "bias":
+            return np.asarray(true + value)
+        if self.fault == "saturate":
+            return np.asarray(clip(true, -np.abs(value), np.abs(value)))
+        return np.asarray(-true) if self.fault == "reverse" else np.broadcast_to(value, true.shape)
 
     def _remember(self, true: np.ndarray) -> np.ndarray:
         """Store the values, and return those of `delay` calls before; the first ones where there were fewer calls."""

@@ -19,3 +19,10 @@ MEASURED_CHANNELS = {
     "is_in_range": "", "ins_cep": "m", "n_seen": "", "n_contacts": "",
 }  # fmt: skip
 """All numbers that sensors that ship write."""
+
+MEASURED_LISTS = {
+    "contacts": ("id team x y z vx vy vz qw qx qy qz", "1 1 m m m m/s m/s m/s 1 1 1 1"),
+    "seen": ("id team bearing elevation range", "1 1 rad rad m"), "blobs": ("id u v width height", ""),
+    "depth_image": ("", "m"), "segmentation_image": ("kind id team solid", ""), "observation": ("value", ""),
+}  # fmt: skip
+"""Fields of all lists that sensors that ship write anew in each call, and their units."""

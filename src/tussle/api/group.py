@@ -62,6 +62,7 @@ class GroupView:
         self._period = dt
         self.begin()
         self.failing_row = None
+        self._clock_error: np.ndarray | None = None
         self.motion_state: np.ndarray = np.empty((0, 0))
         self._seen: set[str] = set()
         self.services: dict[str, Callable[..., Any]] = {}
@@ -163,9 +164,10 @@ class GroupView:
 
     @property
     def t(self) -> np.ndarray:
-        """Time of the visible states [s], (n,); after motion, the end of the step."""
+        """Time of the visible states [s], (n,); after motion, the end of the step. With a `clock_error`, that of the clock."""
         self._differs("reads the time")
-        return np.asarray(self.context.clock.at(self.phase)[self.world])
+        t = np.asarray(self.context.clock.at(self.phase)[self.world])
+        return t if self._clock_error is None else t + self._clock_error
 
     @property
     def step_count(self) -> np.ndarray:
@@ -225,13 +227,24 @@ class GroupView:
         self._caller, self.phase, self.substep = plugin, phase, substep
         self.dt = self._period if dt is None else dt
 
-    def step(self, plugin: Any, active: np.ndarray | None = None) -> None:
+    def step(
+        self, plugin: Any, active: np.ndarray | None = None, *, clock_error: np.ndarray | None = None
+    ) -> None:
         """Step a plugin inside the calling one, with its own random draws.
 
-        With `active`, (n,), only for the rows where it is true: the columns of the others keep their values.
+        With `active`, (n,), only for the rows where it is true: the columns of the others keep their values. With `clock_error` [s], (n,),
+        the time that it reads is so much later than the true one, also for plugins inside it.
         """
         if active is not None:
             self._differs(f"steps {type(plugin).__name__} for some rows")
+        if clock_error is not None:
+            before = self._clock_error
+            self._clock_error = clock_error if before is None else before + clock_error
+            try:
+                self.step(plugin, active)
+            finally:
+                self._clock_error = before
+            return
         caller, self._caller = self._caller, plugin
         if active is None or active.all():
             plugin.step(self)

@@ -13,6 +13,7 @@ from tussle.engine.simulation import Simulation
 from tussle.errors import ParameterError
 from tussle.mission import Mission
 from tussle.stress.games import Played
+from tussle.stress.monitor import Monitor
 from tussle.stress.signals import ChosenRows, Signal, StepView
 from tussle.stress.specification import Specification
 
@@ -42,23 +43,25 @@ def blame(mission: Mission, failed: Played, specification: Specification) -> tup
     """
     step = failed.verdict.first_below(0.0) or 0
     with Simulation(mission.replace(rekeys=failed.game.rekeys), failed.game.seed) as sim:
+        monitor = Monitor(specification, sim)
         sim.step(step)
+        traces = monitor.trace(0)
         parked = sim.state.parked.get(0)
         bodies = sim.state.population.bodies if parked is None else parked.bodies
-        views = [StepView(sim, bodies, ChosenRows(bodies))]
-        if bodies.n <= MAX_BLAMED:
-            views.append(_without_each(bodies, float(sim.t[0])))
-        values = {name: [_value(s, view) for view in views] for name, s in specification.signals.items()}
-    is_broken = dict.fromkeys(values, False)
+        without = _without_each(bodies, float(sim.t[0])) if bodies.n <= MAX_BLAMED else None
+        others = {
+            name: None if without is None else _value(s, without) for name, s in specification.signals.items()
+        }
+    is_broken = dict.fromkeys(traces, False)
     for term in specification.terms.values():
         own = [str(part.signal) for part in term.parts() if hasattr(part, "signal")]
-        if not term.is_late and all(values[n][0] is not None for n in own):
-            is_low = bool((term.values({n: values[n][0] for n in own}) < 0.0).any())
+        if not term.is_late:
+            is_low = bool(term.values(traces)[-1] < 0.0)
             is_broken.update(dict.fromkeys(own, True) if is_low else {})
     found = []
     for name in (name for name, is_so in is_broken.items() if is_so):
-        whole, *without = values[name]
-        mine = np.flatnonzero(without[0] != whole) if without and without[0] is not None else np.zeros(0, int)
+        other = others[name]
+        mine = np.zeros(0, int) if other is None else np.flatnonzero(other != traces[name][-1])
         who = [f"{mission.blocks[bodies.block[i]].name}/{bodies.block_index[i] + 1}" for i in mine]
         found.append(f"{name} of {', '.join(who)}" if 0 < len(who) < bodies.n else name)
     return tuple(found)

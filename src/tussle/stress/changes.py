@@ -89,7 +89,7 @@ def removable(mission: Mission, networks: Collection[str]) -> Iterator[Change]:
 
     That is each fault, each other plugin of a block but its motion model, each interaction, and the messages of the given networks.
     """
-    for path, plugin in _plugins(paths.MissionRoot(mission)):
+    for path, plugin in members(paths.MissionRoot(mission)):
         is_own = len(path) == 2 and any(
             plugin in (*b.autonomy, *b.controller, *b.sensor) for b in mission.blocks
         )
@@ -103,8 +103,8 @@ def removable(mission: Mission, networks: Collection[str]) -> Iterator[Change]:
             yield "reach all", network.instance_name
 
 
-def _plugins(owner: Any, path: Sequence[str] = ()) -> Iterator[tuple[tuple[str, ...], Any]]:
+def members(owner: Any, path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], Any]]:
+    """Yield path and part of all that is inside an owner of `paths`."""
     for name, part in paths.inside(owner).items():
-        if hasattr(part, "instance_name"):
-            yield (*path, name), part
-        yield from _plugins(part, (*path, name))
+        yield (*path, name), part
+        yield from members(part, (*path, name))

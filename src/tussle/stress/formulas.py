@@ -12,8 +12,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tussle.numeric import total
-
 Traces = Mapping[str, np.ndarray]
 """Values of each term, (n_samples,); a quantity that is known at the end only is the same in all samples."""
 
@@ -244,8 +242,3 @@ def guided(known: np.ndarray, guide: np.ndarray) -> np.ndarray:
     far = np.maximum(known, 0.0)
     nearer = np.where(guide < 0.0, 1.0 - 1.0 / (1.0 + far), 1.0 + guide)
     return np.where(known < 0.0, known, nearer)
-
-
-def mean_of(values: Sequence[float]) -> float:
-    """Mean of some numbers, the same in any environment."""
-    return float(total(np.asarray(values, dtype=np.float64))) / len(values)

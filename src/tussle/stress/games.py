@@ -232,7 +232,6 @@ class GamePlayer:
         missions: Makes the missions of games with values, and of those of another mission.
 
     Attributes:
-        n_played: Games that were played, not taken from the ledger.
         game_s: Length of all games [s], those of the ledger too.
         cpu_s: Their CPU time [s].
     """
@@ -251,7 +250,7 @@ class GamePlayer:
         self.batch, self.ledger, self.executor, self.missions = batch, ledger, executor, missions
         self.processes, self.stack, self.on_game = processes, stack, on_game
         self.package = replace(batch.package, watch=by_value.dumps(watching))
-        self.n_played, self.game_s, self.cpu_s = 0, 0.0, 0.0
+        self.game_s = self.cpu_s = 0.0
         self._cost = math.inf  # CPU time of a game of the round before [s]
 
     def play(self, games: Sequence[StressGame]) -> list[Played]:
@@ -292,7 +291,6 @@ class GamePlayer:
                 played = Played(game, message.watched, message.t, message.cpu_s, message.state_hash)
                 found[game] = played
                 spent += message.cpu_s
-                self.n_played += 1
                 if self.ledger is not None:
                     self.ledger.add(played)
                 self.on_game(played)

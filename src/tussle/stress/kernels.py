@@ -6,6 +6,8 @@ import numpy as np
 
 from tussle.numeric.kernel import device, kernel
 
+NEVER = 2**62
+"""Step that no game reaches."""
 SWEEP_FROM = 40_000
 """Pairs of a world from which on sorting by x is faster than looking at all of them."""
 
@@ -193,3 +195,32 @@ def distance_to(vectors, x, y, z, out):
         dy = vectors[1, i] - y
         dz = vectors[2, i] - z
         out[i] = math.sqrt(dx * dx + dy * dy + dz * dz)
+
+
+@kernel("F2 I F2 f8 I I2w Fw")
+def covered(pos, start, places, reach, step, since, out):
+    """Share of places of which an entity has been nearer than a distance, up to moments of games, those of a game in order.
+
+    Args:
+        pos: Positions [m], (3, n), by world.
+        start: Entities of world w are the columns start[w] to start[w + 1].
+        places: The places [m], (k, m); the first k components of a position are compared.
+        reach: The distance [m].
+        step: Step of each world, (n_worlds,).
+        since: Step since which each place is covered, or `NEVER`, (n_worlds, m); (1, m) if all worlds are moments of one game.
+        out: Receives the share, (n_worlds,).
+    """
+    for w in range(len(out)):
+        first, n = since[w] if len(since) > 1 else since[0], 0
+        for k in range(places.shape[1]):
+            if first[k] >= step[w]:
+                first[k] = NEVER
+                for i in range(start[w], start[w + 1]):
+                    distance = 0.0
+                    for c in range(places.shape[0]):
+                        distance += (pos[c, i] - places[c, k]) * (pos[c, i] - places[c, k])
+                    if distance < reach * reach:
+                        first[k] = step[w]
+                        break
+            n += first[k] <= step[w]
+        out[w] = n / places.shape[1]

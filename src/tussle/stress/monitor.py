@@ -14,7 +14,7 @@ from tussle.arguments import explained
 from tussle.engine.simulation import Simulation
 from tussle.mission import Mission
 from tussle.stress.formulas import guided, records
-from tussle.stress.signals import ChosenRows, StepView
+from tussle.stress.signals import ChosenRows, Games, StepView
 from tussle.stress.specification import Function, Specification, columns_of
 
 ROOM = 256
@@ -71,7 +71,8 @@ class Monitor:
         signals = {} if guide is None else guide.signals
         self._signals = list((specification.signals | signals).values())
         self._samples = np.full((len(self._signals), ROOM, sim.n_worlds), np.nan)
-        self._rows = ChosenRows(sim.state.population.bodies)
+        self._kept: dict[str, np.ndarray] = {}
+        self._frame = self._view(sim.state.population.bodies)
         self._verdicts: dict[int, Verdict] = {}
         sim.observers.append(self._observe)
 
@@ -85,9 +86,9 @@ class Monitor:
             return
         state, bodies = sim.state, sim.state.population.bodies
         clock = state.context.clock
-        if bodies.ints is not self._rows.ints:
-            self._rows = ChosenRows(bodies)
-        frame = StepView(sim, bodies, self._rows)
+        frame = self._frame
+        if bodies.ints is not frame.rows.ints:
+            frame = self._frame = self._view(bodies)
         if state.n_running == state.n_worlds and clock.common >= 0:
             self._grow(clock.common)
             for i, signal in enumerate(self._signals):
@@ -98,6 +99,10 @@ class Monitor:
         self._grow(int(steps.max(initial=0)))
         for i, signal in enumerate(self._signals):
             self._samples[i, steps, running] = signal.evaluate(frame)[running]
+
+    def _view(self, bodies: Bodies) -> StepView:
+        games = Games(self.sim.n_worlds, self.sim.state.context.clock.step, self._kept)
+        return StepView(self.sim, bodies, ChosenRows(bodies), games)
 
     def _grow(self, step: int) -> None:
         room = self._samples.shape[1]
@@ -112,7 +117,7 @@ class Monitor:
         bodies: Bodies = sim.state.population.bodies
         if not sim.state.running[world] and world in sim.state.parked:
             bodies = sim.state.parked[world].bodies
-        frame = StepView(sim, bodies, ChosenRows(bodies))
+        frame = self._view(bodies)
         for i, signal in enumerate(self._signals):
             self._samples[i, step, world] = signal.evaluate(frame)[world]
         return {str(s): self._samples[i, : step + 1, world].copy() for i, s in enumerate(self._signals)}

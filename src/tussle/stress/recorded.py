@@ -13,7 +13,7 @@ from tussle.api.bodies import DERIVED, Bodies, derived_from
 from tussle.errors import ParameterError
 from tussle.mission import Mission
 from tussle.record.plugin_columns import PluginColumn, select
-from tussle.stress.signals import ChosenRows, StepView
+from tussle.stress.signals import ChosenRows, Games, StepView
 from tussle.stress.specification import Specification
 
 MAX_ROWS = 200_000
@@ -94,9 +94,11 @@ class RecordedMonitor:
         """Values of each signal at each step, (n_steps,)."""
         run, signals = self._run, self._specification.signals
         found: dict[str, list[np.ndarray]] = {name: [] for name in signals}
+        kept: dict[str, np.ndarray] = {}
         for numbers in np.split(np.arange(len(run.steps)), _edges(run.counts)):
             frames = RecordedFrames(run, numbers.tolist())
-            view = StepView(frames, frames.bodies, ChosenRows(frames.bodies, frames.layout))
+            games = Games(1, np.asarray(run.steps[numbers], np.int64), kept)
+            view = StepView(frames, frames.bodies, ChosenRows(frames.bodies, frames.layout), games)
             for name, signal in signals.items():
                 found[name].append(signal.evaluate(view))
         frame_of = np.searchsorted(run.steps, np.arange(run.steps[-1] + 1), side="right") - 1
@@ -109,8 +111,8 @@ def unrecorded(specification: Specification, mission: Mission) -> str:
     for quantity in specification.quantities:
         return f"{quantity.quantity} is known at the end of a game, and a recording is shown moment by moment"
     for signal in specification.signals.values():
-        if signal.is_function:
-            return f"{signal} is a function of the simulation, and a recording is none"
+        if signal.unrecorded:
+            return f"{signal} {signal.unrecorded}"
         if signal.column not in ("", *known) and not _is_of_body(signal.column):
             return f"{signal.column} is no State or Output of an entity's plugin, and others are not recorded"
     return ""

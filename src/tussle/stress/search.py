@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -110,16 +110,6 @@ def label(settings: Values) -> str:
     return ", ".join(f"{name}={value}" for name, value in settings.items())
 
 
-class Searcher(Protocol):
-    """Proposes values, and learns how near to failure they came."""
-
-    def propose(self) -> list[Values]:
-        """The values of the next round."""
-
-    def learn(self, robustness: Sequence[float]) -> None:
-        """Take the robustness of the games of the round; NaN where the mission cannot be played."""
-
-
 class CubeSearcher:
     """CMA-ES over the cube of the ranges; or, if it is random, evenly drawn values.
 
@@ -207,7 +197,9 @@ class TreeSearcher:
         self._proposer.learn(trials)
 
 
-def searcher(name: str, variables: Sequence[Variable], seed: int, per_round: int) -> Searcher:
+def searcher(
+    name: str, variables: Sequence[Variable], seed: int, per_round: int
+) -> CubeSearcher | TreeSearcher:
     """The searcher of a name.
 
     Raises:
@@ -231,7 +223,7 @@ def search(
     play: Callable[[Sequence[StressGame]], Sequence[Played]],
     refusal: Callable[[Values], str],
     variables: Sequence[Variable],
-    by: Searcher,
+    by: CubeSearcher | TreeSearcher,
     games: int,
     failures: float,
     first_seed: int,

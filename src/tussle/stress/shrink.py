@@ -10,7 +10,7 @@ from typing import Any
 from tussle.engine.simulation import Simulation
 from tussle.errors import ParameterError, TussleError
 from tussle.mission import Block, Mission, paths, to_xml
-from tussle.stress.changes import absent, is_absence, without
+from tussle.stress.changes import absent, is_absence, members, without
 from tussle.stress.games import Played
 from tussle.stress.monitor import Verdict, Watching
 
@@ -141,16 +141,10 @@ def _valid(make: Callable[..., Mission], *arguments: Any, **values: Any) -> Miss
 
 def _rounded(mission: Mission) -> Iterator[Mission | None]:
     """Yield missions with one value rounded."""
-    for path, owner in _owners(paths.MissionRoot(mission)):
+    for path, owner in members(paths.MissionRoot(mission)):
         for name, old in _values(owner):
             for new in _rounder(old):
                 yield _valid(paths.with_value, mission, ".".join((*path, name)), new)
-
-
-def _owners(owner: Any, path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], Any]]:
-    for name, part in paths.inside(owner).items():
-        yield (*path, name), part
-        yield from _owners(part, (*path, name))
 
 
 def _values(owner: Any) -> Iterator[tuple[str, Any]]:

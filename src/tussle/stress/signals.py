@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -20,12 +22,14 @@ from tussle.stress import kernels
 
 EDGE = 0.001
 """Error of a clearance [m]."""
+MAX_PLACES = 100_000
+"""Places whose coverage is measured."""
+AREA = re.compile(r"area (\S+) (\S+) (\S+) (\S+) by (.+)")
 MAX_CLEARANCE = 100.0
 """Clearances are measured up to here [m]; beyond they are this far."""
 
 
-@dataclass(frozen=True)
-class ChosenEntities:
+class ChosenEntities(NamedTuple):
     """Entities that a signal is about.
 
     Attributes:
@@ -102,6 +106,31 @@ class SignalSource(Protocol):
 
 
 @dataclass
+class Games:
+    """The games that the worlds of a body table are moments of, and what is kept of their earlier moments.
+
+    What is kept says at which step it was so: a game that is rewound or begins again forgets what came later.
+
+    Attributes:
+        n: How many games: as many as worlds, or one of which the worlds are moments in order.
+        step: Step of each world, (n_worlds,).
+        kept: Text of a signal -> its numbers of each game, (n, k).
+    """
+
+    n: int
+    step: np.ndarray
+    kept: dict[str, np.ndarray] = field(default_factory=dict)
+
+    def numbers(self, signal: str, k: int) -> np.ndarray:
+        """What is kept for a signal, (n, k or more); at first `NEVER`."""
+        known = self.kept.get(signal, np.empty((self.n, 0), np.int64))
+        if (has := known.shape[1]) < k:
+            known = np.pad(known, ((0, 0), (0, max(k - has, has))), constant_values=kernels.NEVER)
+            self.kept[signal] = known
+        return known
+
+
+@dataclass
 class StepView:
     """The state that signals are computed from.
 
@@ -109,11 +138,13 @@ class StepView:
         sim: The simulation, or what stands in for it.
         bodies: Its body table, or that of a world that has ended.
         rows: ChosenRows of selections.
+        games: What is known of the moments before; None if nothing is.
     """
 
     sim: SignalSource
     bodies: Bodies
     rows: ChosenRows
+    games: Games | None = None
 
     def extreme(self, values: np.ndarray, chosen: ChosenEntities, sign: float) -> np.ndarray:
         """Least (sign 1) or greatest (sign -1) value of the entities of each world, (n_worlds,); values are per row, (n,)."""
@@ -172,6 +203,38 @@ class StepView:
         kernels.least_approach(*chosen, per_second, out)
         return out
 
+    def covered(self, chosen: ChosenEntities, places: np.ndarray, reach: float, signal: str) -> np.ndarray:
+        """Share of places, (k, m), of which an entity has been nearer than `reach` in its k first components, (n_worlds,).
+
+        Args:
+            chosen: The entities.
+            places: The places [m].
+            reach: The distance [m].
+            signal: Under which it is kept which ones were reached before; "" asks for this moment alone.
+
+        Raises:
+            ParameterError: Moments before are not known.
+        """
+        if signal and self.games is None:
+            raise ParameterError(f"{signal} is not known of a single moment")
+        n, (rows, start), out = self.bodies.n_worlds, self.rows.of(chosen), np.empty(self.bodies.n_worlds)
+        games = self.games if signal and self.games else Games(n, np.zeros(n, np.int64))
+        since = games.numbers(signal, places.shape[1])
+        pos = np.take(self.bodies.pos, rows, axis=1)
+        kernels.covered(pos, start, places, reach, games.step, since, out)
+        return out
+
+    def messages(self, network: str) -> np.ndarray:
+        """Copies of messages on a network so far: delivered, then lost for each reason, (1 + n_losses, n_worlds).
+
+        Raises:
+            ParameterError: This is no simulation.
+        """
+        if not isinstance(self.sim, Simulation):
+            raise ParameterError(f"messages of {network} are known in a simulation only")
+        counts: np.ndarray = self.sim.state.networks[network].plugin.link_counts
+        return counts
+
 
 Evaluate = Callable[[StepView], np.ndarray]
 
@@ -184,14 +247,14 @@ class Signal:
         text: As it is written, in one way.
         unit: Its dimension; None where it is not known.
         evaluate: Returns the values, (n_worlds,).
-        is_function: It is a function of the simulation.
+        unrecorded: Why no recording has it; "" where one can have it.
         column: Path of the column that it reads; "" for none.
     """
 
     text: str
     unit: Dimension | None
     evaluate: Evaluate = field(compare=False, repr=False)
-    is_function: bool = False
+    unrecorded: str = ""
     column: str = ""
 
     def __str__(self) -> str:
@@ -208,6 +271,43 @@ def _point(text: str) -> tuple[float, float, float] | None:
     except ValueError:
         raise ParameterError(f"{text!r} is no point; it takes three numbers, as point 10 20 0") from None
     return x, y, z
+
+
+def _places(text: str) -> np.ndarray:
+    """Places [m]: (3, n) of "points 10 20 0 30 40 0"; (2, n) of "area 0 0 90 60 by 10 m", the centres of its squares.
+
+    Raises:
+        ParameterError: The text is neither, or they are too many.
+    """
+    area = AREA.fullmatch(text)
+    try:
+        numbers = list(map(float, area.groups()[:4] if area else text.removeprefix("points ").split()))
+    except ValueError:
+        numbers = []
+    if area and numbers and numbers[0] < numbers[2] and numbers[1] < numbers[3]:
+        edge = units.parse(area[5], "m")
+        sizes = [(numbers[k + 2] - numbers[k]) / edge if edge > 0.0 else math.inf for k in (0, 1)]
+        if sizes[0] * sizes[1] <= MAX_PLACES:
+            x, y = (
+                numbers[k] + edge * (np.arange(max(1, round(size))) + 0.5) for k, size in enumerate(sizes)
+            )
+            return np.stack([np.repeat(x, len(y)), np.tile(y, len(x))])
+        raise ParameterError(f"{text!r} has too many squares; at most {MAX_PLACES:,} are allowed")
+    if (
+        area
+        or not text.startswith("points ")
+        or not numbers
+        or len(numbers) % 3
+        or not np.isfinite(numbers).all()
+    ):
+        raise ParameterError(
+            f"{text!r} is no area and no points; places are area 0 0 90 60 by 10 m (two corners, edge of squares) or points 10 20 0 30 40 0"
+        )
+    return np.ascontiguousarray(np.reshape(numbers, (-1, 3)).T)
+
+
+OF_MESSAGES = "messages_sent", "messages_lost", "loss_rate"
+"""Signals that count messages."""
 
 
 class Factory:
@@ -235,7 +335,10 @@ class Factory:
             ParameterError: There is no such signal, or an argument is not allowed.
         """
         if name in self.functions and not arguments:
-            return Signal(f"{name}()", None, _checked(name, self.functions[name]), is_function=True)
+            evaluate = _checked(name, self.functions[name])
+            return Signal(
+                f"{name}()", None, evaluate, "is a function of the simulation, and a recording is none"
+            )
         if name not in self.kinds:
             known = [*self.kinds, *self.functions]
             raise ParameterError(f"there is no signal {name!r}{nearest_name(name, known)}; {listed(known)}")
@@ -244,7 +347,8 @@ class Factory:
             raise ParameterError(f"{name}() takes {n} argument{'s' * (n != 1)}, not {len(arguments)}")
         unit, evaluate = make(*arguments)
         column = arguments[0] if name in ("min", "max") else ""
-        return Signal(f"{name}({', '.join(arguments)})", unit, evaluate, column=column)
+        unrecorded = "counts messages, which are not recorded step by step" if name in OF_MESSAGES else ""
+        return Signal(f"{name}({', '.join(arguments)})", unit, evaluate, unrecorded, column)
 
     def selection(self, text: str) -> ChosenEntities:
         """Entities by their text."""
@@ -336,6 +440,52 @@ class Factory:
         """The range that entities need to be one connected network: the longest link of their minimum spanning tree [m]."""
         a = self.selection(these)
         return LENGTH, lambda f: _tree(f, a, 0.0)[0]
+
+    def of_coverage(self, these: str, places: str, reach: str) -> tuple[Dimension | None, Evaluate]:
+        """Share of places of which an entity has been nearer than a distance, as coverage(all, area 0 0 90 60 by 10 m, 25 m)."""
+        a, where, limit = self.selection(these), _places(places), units.parse(reach, "m")
+        text = f"coverage({these}, {places}, {reach})"
+        return NONE, lambda f: f.covered(a, where, limit, text)
+
+    def of_coverage_now(self, these: str, places: str, reach: str) -> tuple[Dimension | None, Evaluate]:
+        """Share of places of which an entity is nearer than a distance now."""
+        a, where, limit = self.selection(these), _places(places), units.parse(reach, "m")
+        return NONE, lambda f: f.covered(a, where, limit, "")
+
+    def of_messages_sent(self, network: str) -> tuple[Dimension | None, Evaluate]:
+        """Messages so far to entities within reach that listen, each copy counted."""
+        name = self._network(network)
+        return NONE, lambda f: f.messages(name).sum(axis=0).astype(np.float64)
+
+    def of_messages_lost(self, network: str) -> tuple[Dimension | None, Evaluate]:
+        """Those of them that were lost."""
+        name = self._network(network)
+        return NONE, lambda f: f.messages(name)[1:].sum(axis=0).astype(np.float64)
+
+    def of_loss_rate(self, network: str, time: str) -> tuple[Dimension | None, Evaluate]:
+        """Messages that were lost within the time before, per time [1/s], as loss_rate(RadioNetwork, 10 s)."""
+        name, text, dt = self._network(network), f"loss_rate({network}, {time})", self.mission.dt
+        n = round(units.parse(time, "s") / dt)
+        if n < 1:
+            raise ParameterError(f"loss_rate() takes a time of a step or more, {dt:g} s, not {time!r}")
+
+        def evaluate(f: StepView) -> np.ndarray:
+            lost = f.messages(name)[1:].sum(axis=0)
+            assert f.games is not None  # as there is a simulation
+            step, world = f.games.step, np.arange(f.games.n)
+            before = f.games.numbers(text, int(step.max()) + 1)
+            before[world, step] = lost
+            return np.asarray((lost - before[world, np.maximum(step - n, 0)]) / (n * dt))
+
+        return units.unit_of("1/s").dimension, evaluate
+
+    def _network(self, name: str) -> str:
+        known = [each.instance_name for each in self.mission.networks if type(each).losses]
+        if name not in known:
+            raise ParameterError(
+                f"there is no network {name!r} that counts lost messages{nearest_name(name, known)}; {listed(known)}"
+            )
+        return name
 
     def of_min(self, path: str) -> tuple[Dimension | None, Evaluate]:
         """Least value of a column, by its path: min(prey.Battery.charge); inf without entities."""

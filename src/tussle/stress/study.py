@@ -6,7 +6,7 @@ import hashlib
 import json
 import math
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import asdict
 from functools import cached_property
@@ -323,7 +323,16 @@ class Stress:
         with self._ledger(directory) as ledger:
             player = self._player(ledger, how)
             n_replaced = max(1, round(replaced * particles))
-            play, before, moves = _Random(player.play), list[Repetition](), NO_REDRAWS
+            before, moves = list[Repetition](), NO_REDRAWS
+
+            def play(games: Sequence[StressGame]) -> list[Played]:
+                is_first, played = player.game_s == 0.0, player.play(games)
+                if is_first and len({p.state_hash for p in played}) == 1:
+                    raise ParameterError(
+                        f"all of {len(games):,} games with different seeds are equal: the mission has no randomness, and nothing is rare"
+                    )
+                return played
+
             if redraws:
                 starts = [(b.name, i + 1) for b in self.mission.blocks if not b.rate for i in range(b.count)]
                 few = max(2, particles // 2)
@@ -558,19 +567,3 @@ class Stress:
         if ledger is not None:
             whole = write_result(ledger.path, failures, result, self.failing_mission)
             self._written = ledger.path, whole
-
-
-class _Random:
-    """Plays games, and refuses a mission whose first games are all equal."""
-
-    def __init__(self, play: Callable[[Sequence[StressGame]], list[Played]]) -> None:
-        self._play, self._is_first = play, True
-
-    def __call__(self, games: Sequence[StressGame]) -> list[Played]:
-        played = self._play(games)
-        if self._is_first and len({p.state_hash for p in played}) == 1:
-            raise ParameterError(
-                f"all of {len(games):,} games with different seeds are equal: the mission has no randomness, and nothing is rare"
-            )
-        self._is_first = False
-        return played

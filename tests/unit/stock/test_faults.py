@@ -10,19 +10,24 @@ from test_radio_network import hears, is_near, n_heard, talks
 
 from tussle import Block, Mission, Simulation
 from tussle.api import Autonomy, Input, MotionModel, Output, Sensor, State
-from tussle.api.channels import CHANNEL_UNITS, MEASURED_CHANNELS
+from tussle.api.channels import CHANNEL_UNITS, MEASURED_CHANNELS, MEASURED_LISTS
+from tussle.declare.units import split_units
 from tussle.errors import ParameterError, WiringError
 from tussle.plugins import stock
 from tussle.stock import (
     GPS,
     ActuatorFault,
+    Boundary,
+    ClockOffset,
     FailingRadio,
+    GoToWaypoint,
     Hijack,
     NoisyState,
     RigidBody6DOF,
     SensorFault,
     SingleIntegrator,
     Still,
+    WaypointDispatcher,
 )
 
 CLASSES = {c.__name__: c for c in map(stock.load, stock.manifest()) if not inspect.isabstract(c)}
@@ -32,6 +37,10 @@ STEERED = [n for n, c in VEHICLES.items() if any(not i.optional for i in c.input
 SENSORS = [
     n for n, c in CLASSES.items()
     if issubclass(c, Sensor) and c.grade == "portable" and n != "SensorFault" and any(not o.ragged for o in c.outputs().values())
+]  # fmt: skip
+LISTS = [
+    (n, o) for n, c in CLASSES.items() if issubclass(c, Sensor) and n not in ("SensorFault", "RayTrace")
+    for o in c.outputs() if c.outputs()[o].ragged
 ]  # fmt: skip
 
 
@@ -64,6 +73,10 @@ def test_the_tables_have_all_channels():
             columns = cls.inputs() if issubclass(cls, MotionModel) else cls.outputs()
             known = CHANNEL_UNITS if issubclass(cls, MotionModel) else MEASURED_CHANNELS
             for column in columns.values():
+                if column.ragged and issubclass(cls, Sensor) and cls.__name__ != "RayTrace":
+                    fields, units = MEASURED_LISTS[column.channels[0]]
+                    assert column.fields == tuple(fields.split())
+                    assert column.units == split_units(units, max(1, len(column.fields)))
                 for name, unit in zip(column.channels, column.units, strict=False):
                     assert column.ragged or "ROS" in cls.__name__ or known[name] == unit
 
@@ -107,6 +120,68 @@ def test_measurements_of_all_sensors(name):
         assert np.array_equal(games[0].read("a.pos")[0], games[1].read("a.pos")[0])
 
 
+def lists_of(name, output, **fault):
+    """Lists of a sensor in eight steps, of all entities side by side, and those with a fault in steps 3 to 5."""
+    sensor, found = CLASSES[name](**SMALL.get(name, {})), []
+    channel = type(sensor).outputs()[output].channels[0]
+    crowd = Block(name="b", count=5, position=(8, 4, 50), variance=(20, 20, 20), motion=Still())
+    for faults in ([], [SensorFault(channels=channel, start_after=0.35, duration=0.3, **fault)]):
+        mine = Block(
+            name="a",
+            count=2,
+            position=(3, 4, 50),
+            variance=(9, 9, 9),
+            motion=Still(),
+            sensor=[sensor, *faults],
+        )
+        sim, seen = Simulation(Mission(blocks=[mine, crowd], dt=0.1, end=2.0), seeds=[1, 2]), []
+        for _ in range(8):
+            sim.step()
+            lists = sim.read(f"a.{name}.{output}")[0].ravel()
+            seen.append([np.atleast_2d(each).copy() for each in lists])
+        found.append(seen)
+    return found
+
+
+SMALL = {"DepthCamera": {"img_width": 4, "img_height": 3}}
+"""Parameters of sensors with long lists."""
+
+
+def same(a, b):
+    return all(np.array_equal(x, y, equal_nan=True) for x, y in zip(a, b, strict=True))
+
+
+@pytest.mark.parametrize(("name", "output"), LISTS)
+@pytest.mark.parametrize("fault", ["dropout", "freeze", "delay"])
+def test_lists_of_all_sensors(name, output, fault):
+    right, wrong = lists_of(name, output, fault=fault, delay=2)
+    for k in range(8):
+        if not 3 <= k <= 5:
+            assert same(wrong[k], right[k]), k
+        elif fault == "dropout":
+            assert all(each.size == 0 for each in wrong[k])
+        else:
+            assert same(wrong[k], right[3 if fault == "freeze" else k - 2]), k
+
+
+@pytest.mark.parametrize(
+    ("fault", "altered"),
+    [
+        ("dropout", lambda x: np.full_like(x, 1.5)),
+        ("bias", lambda x: x + 1.5),
+        ("saturate", lambda x: np.clip(x, -1.5, 1.5)),
+        ("reverse", np.negative),
+    ],
+)
+def test_fields_of_lists(fault, altered):
+    right, wrong = lists_of("NoisyContacts", "contacts", fault=fault, value=1.5, fields="x vy")
+    for k, (before, after) in enumerate(zip(right, wrong, strict=True)):
+        for each in before if 3 <= k <= 5 else ():
+            each[[2, 6]] = altered(each[[2, 6]])
+        assert same(before, after)
+    assert before[0].shape == (12, 6)
+
+
 @pytest.mark.parametrize(
     ("fault", "expected"),
     [
@@ -131,6 +206,40 @@ def test_what_a_fault_does(fault, expected):
         seen.append([float(sim.read(f"a.ActuatorFault.{n}_out")[0].ravel()[0]) for n in names])
     assert [row[0] for row in seen] == expected
     assert [row[1:] for row in seen] == [[k, k] for k in range(6)]
+
+
+@pytest.mark.parametrize("fault", ["bias", "reverse", "delay"])
+def test_a_measurement_that_is_kept_is_altered_once(fault):
+    """Without a fix, GPS keeps what it wrote last."""
+    fence = Boundary(boundary_id=1, center=(0, 0, 0), lengths=(100, 100, 100))
+    fault = SensorFault(
+        channels="gps_fix gps_altitude gps_time",
+        fault=fault,
+        value=5.0,
+        delay=2,
+        start_after=0.45,
+        duration=0.3,
+    )
+    seen = []
+    for faults in ([], [fault]):
+        block = Block(name="a", position=(47, 0, 10), autonomy=driver(["velocity_x", "velocity_y", "velocity_z"], 0.0),
+                      motion=SingleIntegrator(), sensor=[GPS(gps_denied_ids="1", noise=(0, 0, 0)), *faults])  # fmt: skip
+        sim = Simulation(Mission(blocks=[block], interactions=[fence], dt=0.1, end=2), 1)
+        found = []
+        for _ in range(12):
+            sim.step()
+            found.append(
+                [sim.read("a.GPS.coordinates")[0][0, 0, 2], sim.read("a.GPS.gps_time")[0].ravel()[0]]
+            )
+        seen.append(np.array(found))
+    right, wrong = seen
+    assert len(set(right[:, 1])) > 2
+    assert (right[1:4, 1] == right[0, 1]).all()
+    faulty = slice(4, 7)
+    expected = right.copy()
+    kind = fault.values["fault"]
+    expected[faulty] = {"bias": right[faulty] + 5.0, "reverse": -right[faulty], "delay": right[2:5]}[kind]
+    assert np.array_equal(wrong, expected)
 
 
 def test_a_belief_that_is_late():
@@ -207,6 +316,54 @@ def test_a_hijacked_robot_is_flown_by_the_adversary_until_it_is_given_back():
     )
 
 
+class Watch(Autonomy):
+    """Writes the time that it reads."""
+
+    velocity = Output("velocity_x velocity_y velocity_z", unit="m/s")
+
+    def step(self, g):
+        self.velocity[0] = g.t
+
+
+@pytest.mark.parametrize(
+    "holder", [lambda *inside: inside, lambda *inside: [Hijack(autonomies=inside, start_after="inf")]]
+)
+def test_a_clock_is_off_by_what_was_drawn_as_the_fault_began(holder):
+    wrong = ClockOffset(
+        autonomies=holder(Watch()), offset=-3.0, offset_sd=0.5, start_after=0.3, duration=0.2, probability=0.7
+    )
+    sim = flight(count=60, autonomy=wrong, motion=SingleIntegrator(max_speed=1e3))
+    seen, faulty = [], []
+    for k in range(8):
+        sim.step()
+        seen.append(sim.read("a.vel")[0][0, :, 0] - 0.1 * k)
+        faulty.append(sim.read("a.ClockOffset.is_faulty")[0][0].copy())
+    has_fault = faulty[3]
+    assert 20 < has_fault.sum() < 55
+    assert [f.tolist() for f in faulty] == [(has_fault & (k in (3, 4))).tolist() for k in range(8)]
+    error = np.array(seen)
+    assert np.abs(error[~np.array(faulty)]).max() < 1e-12
+    assert error[3, has_fault] == pytest.approx(error[4, has_fault], abs=1e-12)
+    assert error[3, has_fault].mean() == pytest.approx(-3.0, abs=4 * 0.5 / has_fault.sum() ** 0.5)
+    assert 0.3 < error[3, has_fault].std() < 0.7
+
+
+def test_a_robot_with_a_slow_clock_acts_late():
+    """It goes to its waypoint of 1 s as its clock shows that."""
+    go = GoToWaypoint(waypoint="XYZ 1 X Y 60 0 0 0 5 -1")
+    slow = ClockOffset(autonomies=[go], offset=-0.7)
+    for autonomy, step in ((go, 10), (slow, 17)):
+        sim = flight(
+            autonomy=[autonomy, WaypointDispatcher(waypointlist_network="LocalNetwork")], motion=Still()
+        )
+        path = "a.GoToWaypoint.is_told" if autonomy is go else "a.ClockOffset.GoToWaypoint.is_told"
+        told = []
+        for _ in range(20):
+            sim.step()
+            told.append(bool(sim.read(path)[0].ravel()[0]))
+        assert told.index(True) == step
+
+
 def test_what_is_refused():
     with pytest.raises(ParameterError, match=r"there is no channel 'sped' \(did you mean 'speed'\?\)"):
         ActuatorFault(channels="sped")
@@ -216,6 +373,21 @@ def test_what_is_refused():
         SensorFault(channels="")
     with pytest.raises(ParameterError, match=r"an attitude is the channels .* and takes freeze or delay"):
         SensorFault(channels="belief_quat_w belief_quat_x belief_quat_y belief_quat_z", fault="bias")
+    for values, says in {
+        "contacts seen": "has several lists; give each a SensorFault of its own",
+        "contacts:fields=xx": r"has no field 'xx' that can be altered \(did you mean 'x'",
+        "contacts:fields=qw": "has no field 'qw' that can be altered",
+        "gps_time:fields=x": "has no field 'x' that can be altered",
+        "contacts:fields=x:fault=delay": "takes no fields; it is of the whole list",
+        "contacts:fault=bias": "needs fields; ",
+        "segmentation_image:fault=reverse": "needs fields",
+        "raytrace": "there is no channel 'raytrace'",
+    }.items():
+        channels, *others = values.split(":")
+        with pytest.raises(ParameterError, match=says):
+            SensorFault(channels=channels, **dict(each.split("=") for each in others))
+    with pytest.raises(WiringError, match="alters channel 'contacts', which no sensor before it writes"):
+        flight(motion=Still(), sensor=[SensorFault(channels="contacts"), NoisyState()])
     with pytest.raises(WiringError, match="alters channel 'belief_pos_x', which no sensor before it writes"):
         flight(motion=Still(), sensor=[SensorFault(), NoisyState()])
     with pytest.raises(

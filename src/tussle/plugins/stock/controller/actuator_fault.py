@@ -53,6 +53,6 @@ class ActuatorFault(ChannelFault, Controller):
         names = self._both()
         given = np.array([getattr(self, f"{name}_in")[0] for name in names])
         k = len(channel_names(self.channels))
-        given[:k] = self.altered(g, given[:k])
+        given[:k] = self.altered(self.begin(g), given[:k])
         for name, row in zip(names, given, strict=True):
             getattr(self, f"{name}_out")[0] = row
