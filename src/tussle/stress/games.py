@@ -79,7 +79,8 @@ class StressGame:
 
     def _with(self, step: int, key: int, kept: Sequence[Rekey], *target: str) -> StressGame:
         added: Any = (step, key, *target)
-        return replace(self, rekeys=tuple(sorted([*kept, added], key=lambda r: (r[0], *r[2:]))))
+        rekeys = tuple(sorted([*kept, added], key=lambda r: (r[0], *r[2:])))
+        return StressGame(self.seed, rekeys, self.values, self.mission, self.change)
 
     def redrawn(self, step: int, key: int, target: str) -> StressGame:
         """The same game, in which the draws of a target alone have another key from a step on."""

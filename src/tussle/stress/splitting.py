@@ -153,24 +153,24 @@ def repetition(
             return
         draws = uniform(first_seed % 2**64, CHOICE, lost, np.full(len(lost), round_), number)[0]
         parents = survivors[np.minimum((draws * len(survivors)).astype(np.int64), len(survivors) - 1)]
-        names = [f"{first_seed} {number} {round_} {place}" for place in range(n)]
-        branches = yield [_beyond(played[i], level, names[k]) for k, i in zip(lost, parents, strict=True)]
+        name = f"{first_seed} {number} {round_}"
+        branches = yield [
+            _beyond(played[i], level, f"{name} {place}")
+            for place, i in zip(lost.tolist(), parents.tolist(), strict=True)
+        ]
         for place, branch in zip(lost.tolist(), branches, strict=True):
             played[place] = branch
+        score[lost] = [branch.verdict.score for branch in branches]
         result.n_games += len(lost)
         if is_fixed:
             for move in range(redraws.n):
-                tried = yield [
-                    redraws.proposal(p.game, f"{name} {move}") for p, name in zip(played, names, strict=True)
-                ]
+                tried = yield [redraws.proposal(p.game, f"{name} {i} {move}") for i, p in enumerate(played)]
                 played = [
                     new if new.verdict.score < level else old for old, new in zip(played, tried, strict=True)
                 ]
-            played = list(
-                (yield [_beyond(p, level, f"{name} moved") for p, name in zip(played, names, strict=True)])
-            )
+            played = list((yield [_beyond(p, level, f"{name} {i} moved") for i, p in enumerate(played)]))
             result.n_games += (redraws.n + 1) * n
-        score = np.array([p.verdict.score for p in played])
+            score = np.array([p.verdict.score for p in played])
         round_ += 1
     result.failures = [p for p in played if p.verdict.has_failed]
     result.n_ancestors = len({p.game.seed for p in played})
