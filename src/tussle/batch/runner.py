@@ -296,7 +296,7 @@ def _check_same(batch: Playable, path: Path, before: dict[str, Any]) -> None:
     ]
     then, code = before.get("code") or {}, now["code"]
     if changed := [name for name in (then | code) if then.get(name) != code.get(name)]:
-        differing.append(f"the code of {', '.join(changed)}, which has changed since")
+        differing.append(f"the code of {', '.join(changed)} or values that it uses, which have changed since")
     what = (
         f"it differs in {', '.join(differing)}"
         if differing

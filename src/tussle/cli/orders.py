@@ -15,7 +15,7 @@ from rich.console import RenderableType
 from rich.text import Text
 
 from tussle.cli.summary import game_facts, result_tables
-from tussle.cli.tables import Row, indented, number_tables, title
+from tussle.cli.tables import Row, fact_list, indented, number_tables, title
 from tussle.cli.terminal import put, say_note
 from tussle.declare.displays import counted
 from tussle.documents import Team
@@ -117,14 +117,18 @@ def analyze_run(directory: Path, as_json: bool) -> None:
         return
     n = sum(giver.names.total() for giver in givers)
     orders_given = [f"{counted(n, 'order')} from outside"] if n else []
-    put("", title(clipped(name), *orders_given, str(directory)))
-    mission = recorded_mission(run.info["mission"]) if worlds else {}
-    for world in worlds[:MAX_WORLDS]:
+    place, mission = ("run", Text(str(directory))), recorded_mission(run.info["mission"]) if worlds else {}
+    put("", title(clipped(name), *orders_given))
+    for i, world in enumerate(worlds[:MAX_WORLDS], 1):
         result = recorded_result(world)
         head = f"world {result.world} · " if len(worlds) > 1 else ""
         put(indented(head + game_facts(result, mission)))
         error = clipped(" ".join((world["error"] or "").split()), MAX_ERROR_SHOWN)
-        put(*result_tables(result, mission, [("error", error), ("hash", shown_name(result.state_hash))]))
+        facts = [("error", error), ("hash", shown_name(result.state_hash))]
+        is_last = i == min(len(worlds), MAX_WORLDS)
+        put(*result_tables(result, mission, [*facts, place] if is_last else facts))
+    if not worlds:
+        put(fact_list([place]))
     put(*(_tables(givers) if givers else ()), "")
     if len(worlds) > MAX_WORLDS:
         say_note(f"{counted(len(worlds) - MAX_WORLDS, 'more world')}: {directory / SUMMARY_FILE}")

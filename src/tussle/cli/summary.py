@@ -14,7 +14,7 @@ from rich.text import Text
 from tussle.cli.progress import times
 from tussle.cli.tables import Cell, fact_list, number_tables, title
 from tussle.cli.terminal import put
-from tussle.declare.displays import counted, number
+from tussle.declare.displays import number
 from tussle.engine.result import WorldResult
 from tussle.engine.simulation import Simulation
 from tussle.record.event_texts import end_text
@@ -69,8 +69,8 @@ def show_summary(simulation: Simulation, name: str, speed: Speed, directory: Pat
 def game_facts(result: WorldResult, mission: Mapping[str, Any]) -> str:
     """Seed, entities and steps of a game on one line. The mission is as `run.json` has it."""
     n = sum(block["count"] or 0 for block in mission["blocks"])
-    entities = "1 entity" if n == 1 else f"{n} entities"
-    return f"seed {result.seed} · {entities} · {counted(result.steps, 'step')} of {mission['dt']:g} s"
+    entities, steps = "entity" if n == 1 else "entities", "step" if result.steps == 1 else "steps"
+    return f"seed {result.seed} · {n} {entities} · {result.steps} {steps} of {mission['dt']:g} s"
 
 
 def result_tables(

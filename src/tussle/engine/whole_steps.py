@@ -6,6 +6,7 @@ import signal
 import threading
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
+from types import FrameType
 
 from tussle.errors import SnapshotError
 
@@ -48,26 +49,32 @@ class WholeSteps:
 
     @contextmanager
     def interruptible(self) -> Iterator[Callable[[], None]]:
-        """Let Ctrl-C take effect between two steps, where the given function is called; a second one at once."""
-        previous = signal.getsignal(signal.SIGINT)
-        if threading.current_thread() is not threading.main_thread() or not callable(previous):
+        """Let Ctrl-C take effect between two steps, where the given function is called; a second one at once.
+
+        Programs that handle Ctrl-C in their own way, as the command does, are left alone.
+        """
+        usual = signal.default_int_handler
+        if (
+            threading.current_thread() is not threading.main_thread()
+            or signal.getsignal(signal.SIGINT) is not usual
+        ):
             yield lambda: None
             return
         pressed: list[int] = []
 
-        def handle(number: int, frame: object) -> None:
+        def handle(number: int, frame: FrameType | None) -> None:
             if pressed or not self._within.locked():
-                previous(number, frame)  # type: ignore[arg-type]
+                usual(number, frame)
             else:
                 pressed.append(number)
 
         def check() -> None:
             if pressed:
-                previous(pressed.pop(), None)
+                usual(pressed.pop(), None)
 
         signal.signal(signal.SIGINT, handle)
         try:
             yield check
         finally:
-            signal.signal(signal.SIGINT, previous)
+            signal.signal(signal.SIGINT, usual)
         check()

@@ -180,7 +180,8 @@ def test_a_batch_does_not_go_on_with_a_class_that_was_edited(tmp_path):
     play(SIMPLE, 2)
     play(SIMPLE, 3)
     with pytest.raises(
-        BatchError, match=r"differs in the code of kit_of_test\.Flier, which has changed since"
+        BatchError,
+        match=r"differs in the code of kit_of_test\.Flier or values that it uses, which have changed",
     ):
         play(SIMPLE.replace("1.0", "2.0"), 4)
     assert json.loads((tmp_path / "b" / "batch.json").read_text())["n_seeds"] == 3
