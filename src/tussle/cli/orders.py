@@ -117,18 +117,15 @@ def analyze_run(directory: Path, as_json: bool) -> None:
         return
     n = sum(giver.names.total() for giver in givers)
     orders_given = [f"{counted(n, 'order')} from outside"] if n else []
-    place, mission = ("run", Text(str(directory))), recorded_mission(run.info["mission"]) if worlds else {}
+    mission = recorded_mission(run.info["mission"]) if worlds else {}
     put("", title(clipped(name), *orders_given))
-    for i, world in enumerate(worlds[:MAX_WORLDS], 1):
+    for world in worlds[:MAX_WORLDS]:
         result = recorded_result(world)
         head = f"world {result.world} · " if len(worlds) > 1 else ""
         put(indented(head + game_facts(result, mission)))
         error = clipped(" ".join((world["error"] or "").split()), MAX_ERROR_SHOWN)
-        facts = [("error", error), ("hash", shown_name(result.state_hash))]
-        is_last = i == min(len(worlds), MAX_WORLDS)
-        put(*result_tables(result, mission, [*facts, place] if is_last else facts))
-    if not worlds:
-        put(fact_list([place]))
+        put(*result_tables(result, mission, [("error", error), ("hash", shown_name(result.state_hash))]))
+    put(fact_list([("run", Text(str(directory)))]))
     put(*(_tables(givers) if givers else ()), "")
     if len(worlds) > MAX_WORLDS:
         say_note(f"{counted(len(worlds) - MAX_WORLDS, 'more world')}: {directory / SUMMARY_FILE}")
@@ -154,12 +151,12 @@ def recorded_result(world: Mapping[str, Any]) -> WorldResult:
     named = world.get("metrics")
     for plugin, found in named.items() if isinstance(named, dict) else ():
         for name, value in found.items() if isinstance(found, dict) else ():
-            if not isinstance(value, dict):
-                metrics.setdefault(shown_name(plugin), {})[shown_name(name)] = shown(value)
-            elif all(re.fullmatch(Team, team) for team in value):
-                metrics.setdefault(shown_name(plugin), {})[shown_name(name)] = {
-                    int(team): shown(one) for team, one in value.items()
-                }
+            each = value if isinstance(value, dict) else {}
+            if all(re.fullmatch(Team, team) for team in each):
+                teams = {int(team): shown(one) for team, one in each.items()}
+                metrics.setdefault(shown_name(plugin), {})[shown_name(name)] = (
+                    teams if isinstance(value, dict) else shown(value)
+                )
     return WorldResult(
         world["world"], world["seed"], shown_name(world["end"]), world["steps"], world["t"], by_team(world["alive"]), metrics,
         by_team(world["scores"]), world["state_hash"], born=by_team(world.get("born") or {}), waited=world.get("waited") or 0,
