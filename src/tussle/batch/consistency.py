@@ -62,8 +62,8 @@ def _check_varied(design: pa.Table, name: str, is_range: bool, file: Path) -> No
         raise BatchError(f"{file}: column {name!r} lacks values")
 
 
-def check_results(table: pa.Table, design: pa.Table, file: Path) -> None:
-    """Check that all rows belong to planned runs and have their points and seeds.
+def check_results(table: pa.Table, design: pa.Table, file: Path, last_run: int = -1) -> None:
+    """Check that all rows belong to planned runs, in order behind a last one, and have their points and seeds.
 
     Raises:
         BatchError: A row does not.
@@ -73,7 +73,7 @@ def check_results(table: pa.Table, design: pa.Table, file: Path) -> None:
         raise BatchError(
             f"{file}: run = {run.max()} is not allowed; the batch has runs 0 to {design.num_rows - 1}"
         )
-    if (np.diff(run) < 0).any():
+    if (np.diff(run, prepend=last_run) < 0).any():
         raise BatchError(f"{file}: the rows are not in the order of their runs")
     for name in ("point", "seed"):
         if name in table.column_names and (table[name].to_numpy() != design[name].to_numpy()[run]).any():
@@ -87,37 +87,69 @@ def bounded(value: float) -> float:
     return float(value)
 
 
-def check_metrics(results: pa.Table, file: Path) -> None:
-    """Check the metrics: their number, names and values, and that each team with "alive" has "start".
+class MetricsCheck:
+    """Checks the metrics of a batch, some runs at a time: their number, names and values, and that each team with "alive" has "start".
 
     The table of runs, with a column per metric and team, must not be much larger than the results.
 
-    Raises:
-        BatchError: A check fails.
+    Args:
+        file: Where they come from.
     """
-    metrics = pc.unique(results["metric"])
-    n_metrics, n_teams, n_runs = len(metrics), len(pc.unique(results["team"])), len(pc.unique(results["run"]))
-    if n_metrics > MAX_METRICS or n_metrics * n_teams * n_runs > ALWAYS_ALLOWED + MAX_EMPTY * len(results):
-        raise BatchError(
-            f"{file}: {n_metrics:,} metrics of {n_teams:,} teams in {n_runs:,} runs are too many for {len(results):,} rows"
+
+    def __init__(self, file: Path) -> None:
+        self._file = file
+        self._metrics: set[str | None] = set()
+        self._teams: set[int | None] = set()
+        self._n_runs = self._n_rows = 0
+        self._left: set[int | None] = set()
+        self._begun: set[int | None] = set()
+
+    def add(self, results: pa.Table) -> None:
+        """Check further runs.
+
+        Raises:
+            BatchError: A check fails.
+        """
+        new = {*pc.unique(results["metric"]).to_pylist()} - self._metrics
+        self._metrics |= new
+        self._teams.update(pc.unique(results["team"]).to_pylist())
+        self._n_runs, self._n_rows = (
+            self._n_runs + len(pc.unique(results["run"])),
+            self._n_rows + len(results),
         )
-    for metric in metrics.to_pylist():
-        try:
-            Quantity.parse(column_name(metric, 0))
-        except ParameterError as error:
-            raise BatchError(f"{file}: {error}") from None
-    values = results["value"].to_numpy()
-    with np.errstate(invalid="ignore"):
-        wrong = np.flatnonzero(np.isfinite(values) & (np.abs(values) > MAX_VALUE))
-    if len(wrong):
-        raise BatchError(
-            f"{file}: value = {values[wrong[0]]} in row {wrong[0]} is not allowed; a metric is infinite, or {MAX_VALUE:g} at the most"
-        )
-    ended = results.filter(pc.not_equal(results["end"], "error"))
-    left, begun = (
-        set(ended.filter(pc.equal(ended["metric"], name))["team"].to_pylist()) for name in ("alive", "start")
-    )
-    if left != begun:
-        raise BatchError(
-            f"{file}: team {min(left ^ begun, key=str)} has one of the metrics 'alive' and 'start', and not the other"
-        )
+        n_metrics, n_teams, n_runs = len(self._metrics), len(self._teams), self._n_runs
+        if (
+            n_metrics > MAX_METRICS
+            or n_metrics * n_teams * n_runs > ALWAYS_ALLOWED + MAX_EMPTY * self._n_rows
+        ):
+            raise BatchError(
+                f"{self._file}: {n_metrics:,} metrics of {n_teams:,} teams in {n_runs:,} runs are too many for {self._n_rows:,} rows"
+            )
+        for metric in new:
+            try:
+                Quantity.parse(column_name(metric, 0))
+            except ParameterError as error:
+                raise BatchError(f"{self._file}: {error}") from None
+        values = results["value"].to_numpy()
+        with np.errstate(invalid="ignore"):
+            wrong = np.flatnonzero(np.isfinite(values) & (np.abs(values) > MAX_VALUE))
+        if len(wrong):
+            raise BatchError(
+                f"{self._file}: value = {values[wrong[0]]} of run {results['run'][int(wrong[0])]} is not allowed; "
+                f"a metric is infinite, or {MAX_VALUE:g} at the most"
+            )
+        ended = results.filter(pc.not_equal(results["end"], "error"))
+        for name, teams in (("alive", self._left), ("start", self._begun)):
+            teams.update(pc.unique(ended.filter(pc.equal(ended["metric"], name))["team"]).to_pylist())
+
+    def end(self) -> None:
+        """Check what only all runs tell.
+
+        Raises:
+            BatchError: A check fails.
+        """
+        if self._left != self._begun:
+            raise BatchError(
+                f"{self._file}: team {min(self._left ^ self._begun, key=str)} has one of the metrics 'alive' and 'start', "
+                "and not the other"
+            )

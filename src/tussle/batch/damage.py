@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from tussle.batch import store
+from tussle.batch.schemas import BATCH_FILE, PARTS, TABLES
 from tussle.errors import BatchError, RecordError
 from tussle.record.damage import damage_in_run, stream_damage
 from tussle.record.parquet_blocks import intact_groups
@@ -27,20 +28,20 @@ def damage_in_batch(path: str | Path) -> tuple[list[str], list[str]]:
     try:
         info = store.read_info(place)
         damage += store.damage(place, info)
-        for name in store.TABLES:
+        for name in TABLES:
             file = place / name
             if file.exists() and not damage:
                 with file.open("rb") as opened:
                     if intact_groups(opened, file.stat().st_size) is None:
                         unchecked.append(f"{name} has no checksums")
     except BatchError as error:
-        if not (place / store.BATCH_FILE).exists():
+        if not (place / BATCH_FILE).exists():
             raise
         damage.append(str(error))
-    for part in sorted((place / store.PARTS).glob("*.arrow")):
+    for part in sorted((place / PARTS).glob("*.arrow")):
         found, unknown = stream_damage(part)
-        damage += [f"{store.PARTS}/{found}"] if found else []
-        unchecked += [f"{store.PARTS}/{unknown}"] if unknown else []
+        damage += [f"{PARTS}/{found}"] if found else []
+        unchecked += [f"{PARTS}/{unknown}"] if unknown else []
     for run in sorted((place / store.RUNS).glob("*")):
         try:
             found_in, unknown_in = damage_in_run(run)

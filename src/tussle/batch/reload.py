@@ -170,7 +170,7 @@ def planned_run(
         **options,
     )
     mission = loaded.mission.ending_by_time() if about["ends_by_time"] else loaded.mission
-    found = results.table.filter(pc.equal(results.table["run"], number))["state_hash"]
+    found = results.runs.filter(pc.equal(results.runs["run"], number))["state_hash"]
     return PlannedRun(loaded, mission, planned["seed"], found[0].as_py() if len(found) else "")
 
 

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.compute as pc
 
 from tussle.arguments import explained
 from tussle.batch import run_table
@@ -68,8 +67,6 @@ class Results:
         info: What `batch.json` says.
         notes: What is missing, and notes about the mission file, one line each.
         design: One row per planned run: run, point, seed and the variables.
-        table: One row per run, team and metric.
-        alive: Entities of each run and team whenever their number changes.
         runs: One row per finished run: keys, variables, how it ended, and each quantity.
         n_distinct: Distinct games among the runs that did not fail: where nothing in those of a point depends on the seed, they are
             copies of one game.
@@ -80,9 +77,8 @@ class Results:
         self.info: dict[str, Any] = stored.info
         self.notes: list[str] = [*stored.notes, *(stored.info.get("mission", {}).get("notes") or ())]
         self.design: pa.Table = stored.design
-        self.table: pa.Table = stored.table
-        self.alive: pa.Table = stored.alive
-        facts = run_table.first_rows(self.table)
+        self._stored = stored
+        facts = stored.runs
         self._run: np.ndarray = facts["run"].to_numpy()
         self._point: np.ndarray = facts["point"].to_numpy()
         self._seed_index: np.ndarray = self._run // max(1, len(self.points))
@@ -102,7 +98,7 @@ class Results:
         self.runs: pa.Table = pa.table(keyed | new)
 
     def _quantities_of(self, facts: pa.Table) -> dict[str, np.ndarray]:
-        metrics = run_table.metric_columns(self.table)
+        metrics = self._stored.metrics
         columns: dict[str, np.ndarray] = {}
         scored = [team for team in self.teams if column_name("score", team) in metrics]
         winner = run_table.floats(facts["winner"])
@@ -118,7 +114,19 @@ class Results:
         columns = metrics | columns
         order = [column_name(metric, team) for metric in COUNTED for team in (*self.teams, None)]
         columns = {name: columns[name] for name in dict.fromkeys([*order, *columns]) if name in columns}
-        return {name: np.where(self._is_failed, np.nan, values) for name, values in columns.items()}
+        if self._is_failed.any():
+            columns = {name: np.where(self._is_failed, np.nan, values) for name, values in columns.items()}
+        return columns
+
+    @property
+    def table(self) -> pa.Table:
+        """One row per run, team and metric; of a very large batch, it is read when it is asked for."""
+        return self._stored.table
+
+    @property
+    def alive(self) -> pa.Table:
+        """Entities of each run and team whenever their number changes."""
+        return self._stored.alive
 
     # -- what there is ----------------------------------------------------------------------------------------------------
 
@@ -131,8 +139,7 @@ class Results:
     def teams(self) -> dict[int, str]:
         """Number of each team -> its name."""
         named = {int(team): str(name) for team, name in self.info["teams"].items()}
-        found = (team for team in pc.unique(self.table["team"]).to_pylist() if team is not None)
-        return dict(sorted(({team: f"team {team}" for team in found} | named).items()))
+        return dict(sorted(({team: f"team {team}" for team in self._stored.teams} | named).items()))
 
     @cached_property
     def colours(self) -> dict[int, str]:

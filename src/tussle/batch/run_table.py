@@ -9,41 +9,69 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from tussle.batch.quantities import column_name
-from tussle.batch.schemas import CHANCE
+from tussle.batch.schemas import CHANCE, OF_RUN, RESULTS
 
 FACTS = ("end", "t", "steps", "winner", "error", "state_hash", "cpu_s", "host")
 """Columns of the results that are the same in all rows of a run, in the order in which the table of runs has them."""
 KEYS = ("run", "point", "seed")
 
 
-def first_rows(table: pa.Table) -> pa.Table:
-    """The first row of each run, in order of run."""
-    _, first = np.unique(table["run"].to_numpy(), return_index=True)
-    return table.take(pa.array(first))
+OF_RUNS = (*KEYS, *OF_RUN)
 
 
-def metric_columns(table: pa.Table) -> dict[str, np.ndarray]:
-    """Name such as "score[2]" -> value for each run, (n_runs,); NaN where the run does not have it.
+class RunColumns:
+    """A row per run and a column per metric and team, of results that come some runs at a time.
 
-    Args:
-        table: One row per run, team and metric; in any order.
+    Attributes:
+        teams: Numbers of the teams that have metrics.
     """
-    numbers, row = np.unique(table["run"].to_numpy(), return_inverse=True)
-    metric = table["metric"].combine_chunks().dictionary_encode()
-    team = table["team"].combine_chunks().dictionary_encode(null_encoding="encode")
-    n_teams = max(1, len(team.dictionary))
-    code = pc.fill_null(metric.indices, -1).to_numpy().astype(np.int64) * n_teams + team.indices.to_numpy()
-    is_metric = code >= 0
-    code, row = code[is_metric], row[is_metric]
-    present = np.flatnonzero(np.bincount(code))
-    place = np.zeros(present[-1] + 1 if len(present) else 0, dtype=np.int64)
-    place[present] = np.arange(len(present))
-    values = np.full((len(present), len(numbers)), np.nan)
-    values[place[code], row] = floats(table["value"])[is_metric]
-    metrics, teams = metric.dictionary.to_pylist(), team.dictionary.to_pylist()
-    keys = [(metrics[c // n_teams], teams[c % n_teams]) for c in present]
-    order = sorted(range(len(keys)), key=lambda i: (keys[i][0], keys[i][1] is not None, keys[i][1] or 0))
-    return {column_name(*keys[i]): values[i] for i in order}
+
+    def __init__(self) -> None:
+        self._runs = [RESULTS.empty_table().select(OF_RUNS)]
+        self._n = 0
+        self._values: dict[tuple[str, int | None], list[tuple[int, np.ndarray]]] = {}
+        self._teams: set[int | None] = set()
+
+    @property
+    def teams(self) -> list[int]:
+        return sorted(team for team in self._teams if team is not None)
+
+    def add(self, results: pa.Table) -> None:
+        """Append the rows of further runs: one per run, team and metric, in any order."""
+        numbers, first, row = np.unique(results["run"].to_numpy(), return_index=True, return_inverse=True)
+        self._runs.append(results.select(OF_RUNS).take(pa.array(first)))
+        self._teams.update(pc.unique(results["team"]).to_pylist())
+        metric = results["metric"].combine_chunks().dictionary_encode()
+        team = results["team"].combine_chunks().dictionary_encode(null_encoding="encode")
+        metrics, teams = metric.dictionary.to_pylist(), team.dictionary.to_pylist()
+        code = (
+            pc.fill_null(metric.indices, -1).to_numpy().astype(np.int64) * max(1, len(teams))
+            + team.indices.to_numpy()
+        )
+        is_metric = code >= 0
+        code, row = code[is_metric], row[is_metric]
+        present, place = np.unique(code, return_inverse=True)
+        values = np.full((len(present), len(numbers)), np.nan)
+        values[place, row] = floats(results["value"])[is_metric]
+        for c, column in zip(present.tolist(), values, strict=True):
+            key = metrics[c // len(teams)], teams[c % len(teams)]
+            self._values.setdefault(key, []).append((self._n, column.copy()))
+        self._n += len(numbers)
+
+    def taken(self) -> tuple[pa.Table, dict[str, np.ndarray]]:
+        """What was added, which is then gone from here, so that it is in memory once.
+
+        Returns:
+            One row per run, with its keys and how it ended; and name such as "score[2]" -> value for each run, (n_runs,), NaN where the run
+            does not have it.
+        """
+        runs, self._runs = pa.concat_tables(self._runs), []
+        found: dict[str, np.ndarray] = {}
+        for key in sorted(self._values, key=lambda each: (each[0], each[1] is not None, each[1] or 0)):
+            column = found[column_name(*key)] = np.full(self._n, np.nan)
+            for first, values in self._values.pop(key):
+                column[first : first + len(values)] = values
+        return runs, found
 
 
 def floats(column: pa.ChunkedArray) -> np.ndarray:

@@ -10,15 +10,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
-import numpy as np
 import pyarrow as pa
-import pyarrow.compute as pc
 
 from tussle.batch import store as files
 from tussle.batch.executors import Executor, InProcess, Processes
+from tussle.batch.finished_runs import FinishedRuns, finished_in, last_finished, run_seconds, tables
 from tussle.batch.plan import BatchPlan
 from tussle.batch.progress import Progress
 from tussle.batch.results import Results
+from tussle.batch.schemas import ALIVE, ALIVE_FILE, BATCH_FILE, DESIGN_FILE, RESULTS, RESULTS_FILE
 from tussle.batch.sequential import Question, Rule, SequentialStop
 from tussle.batch.stopping import Stop
 from tussle.batch.store import Store, StoredBatch
@@ -199,9 +199,11 @@ def play_in_memory(
     runner = _Runner(batch, batch.plan, kept.add, _stop_of(until, batch, batch.plan), on_progress)
     runner.play((), executor)
     design = runner.final_plan.table()
-    results, alive = files.tables(kept.played(), design)
-    info = _final_info(runner, timings, ["python"], None, results)
-    return Results(StoredBatch(None, info, design, results, alive))
+    finished = tables(kept.played(), design)
+    cpu_s = run_seconds(finished[0])
+    return Results(
+        StoredBatch(None, _final_info(runner, timings, ["python"], None, cpu_s), design, [finished])
+    )
 
 
 def play_in_directory(
@@ -222,7 +224,7 @@ def play_in_directory(
     timings = Timings()
     if batch.plugin_files:
         remember(batch.plugin_files)
-    if not (path / files.BATCH_FILE).exists():
+    if not (path / BATCH_FILE).exists():
         batch.check(until)  # before anything is written
     with closing(Store(path)) as store:
         before = store.info
@@ -231,8 +233,8 @@ def play_in_directory(
             if on_progress is not None:
                 on_progress(Progress(before["n_runs"], before["n_runs"], before["n_runs"]))
             return Results(files.load(path))
-        played, notes = files.read_played(path)
-        n_kept = 0 if before is None else _seeds_to_keep(path, played, before, until)
+        notes: list[str] = []
+        n_kept = 0 if before is None else _seeds_to_keep(path, before, until)
         plan = dataclasses.replace(batch.plan, n_seeds=max(batch.plan.n_seeds, n_kept))
         n_asked = batch.plan.n_seeds if before is not None and before.get("is_partial") else None
         stop = _stop_of(until, batch, plan, n_kept)
@@ -245,14 +247,14 @@ def play_in_directory(
         # First batch.json, so that all other files are known to be of this batch.
         store.write_info(_info(runner, plan, command) | started)
         store.write_folder(files.MISSION, batch.mission_files())
-        store.write_table(files.DESIGN_FILE, plan.table())
-        known, _ = files.merged(path, played, plan.table(), notes)
+        store.write_table(DESIGN_FILE, plan.table())
+        known = FinishedRuns(path, plan.table(), notes)
         for note in notes:
             warnings.warn(
                 f"{path}: {note}; the runs that it lacks are played again", RuntimeWarning, stacklevel=2
             )
         try:
-            runner.play(files.finished_in(known), executor)
+            runner.play((run for results, _ in known for run in finished_in(results)), executor)
         finally:
             store.close_part()
         _write_tables(store, runner, timings, command, before)
@@ -273,7 +275,7 @@ def is_played(batch: Playable, path: Path, until: Rule | None) -> bool:
     Raises:
         BatchError: The directory holds another batch, or one that cannot be read.
     """
-    if not (path / files.BATCH_FILE).exists():
+    if not (path / BATCH_FILE).exists():
         return False
     info = files.read_info(path)
     _check_same(batch, path, info)
@@ -320,7 +322,7 @@ def _has_all(before: dict[str, Any], plan: BatchPlan, until: Rule | None) -> boo
     return not before.get("is_partial") and bool(before["n_seeds"] >= plan.n_seeds)
 
 
-def _seeds_to_keep(path: Path, played: pa.Table, before: dict[str, Any], until: Rule | None) -> int:
+def _seeds_to_keep(path: Path, before: dict[str, Any], until: Rule | None) -> int:
     """Seeds that the batch has in any case, since games of them were asked for by another command and are finished.
 
     Those that the same command, before it was killed, had played beyond what is enough do not count: with them the batch would
@@ -331,25 +333,25 @@ def _seeds_to_keep(path: Path, played: pa.Table, before: dict[str, Any], until: 
     kept = int(before.get("n_seeds_kept", 0))
     if until is not None and before.get("until") == str(until):
         return kept
-    old = files.read_table(path, files.RESULTS_FILE, files.RESULTS, [])
-    last = [pc.max(table["run"]).as_py() for table in (played, old) if table is not None and table.num_rows]
-    return max(kept, *(run // int(before["n_points"]) + 1 for run in last)) if last else kept
+    return max(kept, -(-last_finished(path) // int(before["n_points"])))
 
 
 def _write_tables(
     store: Store, runner: _Runner, timings: Timings, command: Sequence[str], before: dict[str, Any] | None
 ) -> None:
     """Write the tables, and last the `batch.json` that says that they are there."""
-    plan = runner.final_plan
-    design = plan.table()
-    results, alive = files.merged(store.path, files.read_played(store.path)[0], design, [])
-    if plan != runner.plan:
-        results, alive = (t.filter(pc.less(t["run"], plan.n_runs)) for t in (results, alive))
-    store.write_table(files.ALIVE_FILE, alive)
-    store.write_table(files.RESULTS_FILE, results)
-    store.write_table(files.DESIGN_FILE, design)
+    design, cpu_s = runner.final_plan.table(), 0.0
+
+    def rows() -> Iterator[tuple[pa.Table, pa.Table]]:
+        nonlocal cpu_s
+        for results, alive in FinishedRuns(store.path, design, []):
+            cpu_s += run_seconds(results)
+            yield alive, results
+
+    store.write_tables({ALIVE_FILE: ALIVE, RESULTS_FILE: RESULTS}, rows())
+    store.write_table(DESIGN_FILE, design)
     store.drop_parts()
-    store.write_info(_final_info(runner, timings, command, before, results))
+    store.write_info(_final_info(runner, timings, command, before, cpu_s))
 
 
 def _info(runner: _Runner, plan: BatchPlan, command: Sequence[str]) -> dict[str, Any]:
@@ -374,16 +376,15 @@ def _final_info(
     timings: Timings,
     command: Sequence[str],
     before: dict[str, Any] | None,
-    results: pa.Table,
+    cpu_s: float,
 ) -> dict[str, Any]:
     spent = timings.so_far()
-    first_rows = np.flatnonzero(np.diff(results["run"].to_numpy(), prepend=-1))
     return _info(runner, runner.final_plan, command) | {
         "is_complete": True,
         "timings": {
             "began": spent["began"],
             "wall_s": round(_wall_of(before) + spent["wall_s"], 3),
-            "cpu_s": round(float(results["cpu_s"].to_numpy()[first_rows].sum()), 3),
+            "cpu_s": round(cpu_s, 3),
         },
     }
 

@@ -1,8 +1,10 @@
-"""The schema of `batch.json`, and bounds of the values in the tables."""
+"""The schema of `batch.json`, and the columns of the tables and bounds of their values."""
 
 from __future__ import annotations
 
 from typing import Any
+
+import pyarrow as pa
 
 from tussle.batch.plan import MAX_RUNS
 from tussle.batch.varied import variable_of
@@ -120,3 +122,54 @@ RULES: Rules = {
     GROUP: RUN, CHANCE: Bounds(0, PLAYED_BY_CHANCE), "cpu_s": Bounds(0.0), "host": TEXT, "alive": COUNT,
 }  # fmt: skip
 """Bounds of the columns of a batch's tables."""
+
+BATCH_FILE, DESIGN_FILE = "batch.json", "design.parquet"
+RESULTS_FILE, ALIVE_FILE = "results.parquet", "alive.parquet"
+PARTS = "parts"
+"""Folder of the files of finished runs that are not in the tables yet."""
+
+_METRIC = pa.struct([("team", pa.int32()), ("metric", pa.string()), ("value", pa.float64())])
+_ALIVE = pa.struct([("team", pa.int32()), ("t", pa.float64()), ("alive", pa.int32())])
+
+PLAYED = pa.schema(
+    [
+        ("run", pa.int64()),
+        ("end", pa.string()),
+        ("t", pa.float64()),
+        ("steps", pa.int32()),
+        ("winner", pa.int32()),
+        ("state_hash", pa.string()),
+        (GROUP, pa.int32()),
+        (CHANCE, pa.uint8()),
+        ("error", pa.string()),
+        ("cpu_s", pa.float64()),
+        ("host", pa.string()),
+        ("metrics", pa.list_(_METRIC)),
+        ("alive", pa.list_(_ALIVE)),
+    ]
+)
+"""One row per finished run, as it is appended."""
+
+OF_RUN = ("end", "t", "steps", "winner", "state_hash", GROUP, CHANCE, "error", "cpu_s", "host")
+
+RESULTS = pa.schema(
+    [
+        ("run", pa.int64()),
+        ("point", pa.int32()),
+        ("seed", pa.uint64()),
+        ("team", pa.int32()),
+        ("metric", pa.string()),
+        ("value", pa.float64()),
+        *((name, PLAYED.field(name).type) for name in OF_RUN),
+    ]
+)
+"""One row per run, team and metric, sorted by these; metrics of the world come before those of teams."""
+
+ALIVE = pa.schema([("run", pa.int64()), ("team", pa.int32()), ("t", pa.float64()), ("alive", pa.int32())])
+"""One row for each change of the number of a team's entities, from the start of the run to its end."""
+
+DESIGN = pa.schema([("run", pa.int64()), ("point", pa.int32()), ("seed", pa.uint64())])
+"""One row per planned run; a column for each variable follows."""
+
+TABLES = {DESIGN_FILE: DESIGN, RESULTS_FILE: RESULTS, ALIVE_FILE: ALIVE}
+"""Files of a complete batch, and their columns."""

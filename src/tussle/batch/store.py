@@ -3,147 +3,98 @@
 from __future__ import annotations
 
 import contextlib
-import math
 import os
 import shutil
 import warnings
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator, Mapping
+from functools import cached_property
 from pathlib import Path
 from typing import IO, Any
 
-import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from tussle.batch.consistency import check_design, check_metrics, check_results
-from tussle.batch.schemas import BATCH, CHANCE, GROUP, LATER, PLAYED_BY_CHANCE, RULES
+from tussle.batch.consistency import check_design
+from tussle.batch.finished_runs import FinishedRuns, completed, row, whole
+from tussle.batch.run_table import RunColumns
+from tussle.batch.schemas import BATCH, BATCH_FILE, DESIGN, DESIGN_FILE, LATER, PARTS, PLAYED, RULES, TABLES
 from tussle.batch.tasks import Finished
 from tussle.documents import is_count, json_text
 from tussle.errors import BatchError, RecordError
 from tussle.folders import lock, open_safely
-from tussle.record.arrow_file import read_batches
-from tussle.record.parquet_blocks import write_parquet
+from tussle.record.parquet_blocks import ParquetBlocks
 from tussle.record.parquet_file import read_parquet
 from tussle.record.run_file import plain, put_whole
 from tussle.record.stream import Stream
 from tussle.record.table_values import check_values
 
-BATCH_FILE, DESIGN_FILE = "batch.json", "design.parquet"
-RESULTS_FILE, ALIVE_FILE = "results.parquet", "alive.parquet"
 MAX_IN_PART = 2000
 """Runs in one file of parts: each is a record batch, which in memory takes ten times what the run takes in a table."""
 
-PARTS, RUNS, MISSION, PLUGINS, LOCK = "parts", "runs", "mission", "plugins", "lock"
-
-_METRIC = pa.struct([("team", pa.int32()), ("metric", pa.string()), ("value", pa.float64())])
-_ALIVE = pa.struct([("team", pa.int32()), ("t", pa.float64()), ("alive", pa.int32())])
-
-PLAYED = pa.schema(
-    [
-        ("run", pa.int64()),
-        ("end", pa.string()),
-        ("t", pa.float64()),
-        ("steps", pa.int32()),
-        ("winner", pa.int32()),
-        ("state_hash", pa.string()),
-        (GROUP, pa.int32()),
-        (CHANCE, pa.uint8()),
-        ("error", pa.string()),
-        ("cpu_s", pa.float64()),
-        ("host", pa.string()),
-        ("metrics", pa.list_(_METRIC)),
-        ("alive", pa.list_(_ALIVE)),
-    ]
-)
-"""One row per finished run, as it is appended."""
+RUNS, MISSION, PLUGINS, LOCK = "runs", "mission", "plugins", "lock"
 
 IS_OWN = (BATCH_FILE, f"{BATCH_FILE}.part", LOCK)
 """Files that a directory may have before its batch has begun: a batch may have been killed then."""
 
-OF_RUN = ("end", "t", "steps", "winner", "state_hash", GROUP, CHANCE, "error", "cpu_s", "host")
-
-RESULTS = pa.schema(
-    [
-        ("run", pa.int64()),
-        ("point", pa.int32()),
-        ("seed", pa.uint64()),
-        ("team", pa.int32()),
-        ("metric", pa.string()),
-        ("value", pa.float64()),
-        *((name, PLAYED.field(name).type) for name in OF_RUN),
-    ]
-)
-"""One row per run, team and metric, sorted by these; metrics of the world come before those of teams."""
-
-ALIVE = pa.schema([("run", pa.int64()), ("team", pa.int32()), ("t", pa.float64()), ("alive", pa.int32())])
-"""One row for each change of the number of a team's entities, from the start of the run to its end."""
-
-DESIGN = pa.schema([("run", pa.int64()), ("point", pa.int32()), ("seed", pa.uint64())])
-"""One row per planned run; a column for each variable follows."""
-
-TABLES = {DESIGN_FILE: DESIGN, RESULTS_FILE: RESULTS, ALIVE_FILE: ALIVE}
-"""Files of a complete batch, and their columns."""
+MAX_HELD = 1 << 26
+"""Size of tables [B] up to which those of a directory stay in memory; larger ones are read again by whoever asks for them."""
 
 
-@dataclass
 class StoredBatch:
     """The contents of a batch directory, or of a batch in memory.
 
-    Attributes:
+    Args:
         path: The directory; None in memory.
         info: Contents of `batch.json`.
         design: One row per planned run.
-        table: `RESULTS` of the finished runs.
-        alive: `ALIVE` of the finished runs.
+        finished: Rows of `RESULTS` and `ALIVE` of the finished runs, some runs at a time, in any number of passes.
         notes: What is missing, one line each.
+
+    Attributes:
+        runs: One row per finished run: its keys, and how it ended.
+        metrics: Name such as "score[2]" -> value for each run, (n_runs,); NaN where the run does not have it.
+        teams: Numbers of the teams that have metrics, in order.
+        notes: The lines.
     """
 
-    path: Path | None
-    info: dict[str, Any]
-    design: pa.Table
-    table: pa.Table
-    alive: pa.Table
-    notes: list[str] = field(default_factory=list)
+    def __init__(
+        self, path: Path | None, info: dict[str, Any], design: pa.Table,
+        finished: Iterable[tuple[pa.Table, pa.Table]], notes: list[str] | None = None,
+    ) -> None:  # fmt: skip
+        self.path, self.info, self.design = path, info, design
+        self.notes = [] if notes is None else notes
+        columns, held, size = RunColumns(), list[tuple[pa.Table, pa.Table]](), 0
+        for some in finished:
+            columns.add(some[0])
+            size += sum(table.nbytes for table in some)
+            if size <= MAX_HELD:
+                held.append(some)
+            else:
+                held.clear()
+        self._finished = finished if path is None else held if size <= MAX_HELD else None
+        self.runs, self.metrics = columns.taken()
+        self.teams = columns.teams
 
+    @cached_property
+    def _tables(self) -> tuple[pa.Table, pa.Table]:
+        if self._finished is not None:
+            return whole(self._finished)
+        assert self.path is not None
+        design = _read_design(self.path, read_info(self.path))  # the batch may have been gone on with since
+        results, alive = whole(FinishedRuns(self.path, design, []))
+        runs = self.runs["run"].combine_chunks()
+        results, alive = (table.filter(pc.is_in(table["run"], runs)) for table in (results, alive))
+        return results, alive
 
-def row(finished: Finished) -> pa.RecordBatch:
-    """A finished run as one row."""
-    f = finished
-    values = {name: getattr(f, name) for name in OF_RUN} | {
-        "run": f.number,
-        "error": f.error or None,
-        "metrics": [{"team": t, "metric": m, "value": None if math.isnan(v) else v} for t, m, v in f.metrics],
-        "alive": [{"team": team, "t": t, "alive": n} for team, t, n in f.alive],
-    }
-    return pa.RecordBatch.from_pylist([values], PLAYED)
+    @property
+    def table(self) -> pa.Table:
+        """`RESULTS` of the finished runs."""
+        return self._tables[0]
 
-
-def tables(played: pa.Table, design: pa.Table) -> tuple[pa.Table, pa.Table]:
-    """`RESULTS` and `ALIVE` of finished runs; where a run is there twice, the first row counts."""
-    runs, first = np.unique(played["run"].to_numpy(), return_index=True)
-    is_planned = runs < design.num_rows  # a design has the runs 0, 1, 2 ...
-    played = played.take(pa.array(first[is_planned])).combine_chunks()
-    of_run = design.take(pa.array(runs[is_planned]))
-    if not played.num_rows:
-        return RESULTS.empty_table(), ALIVE.empty_table()
-    index, found = _exploded(played["metrics"])
-    columns = {name: found.field(name) for name in ("team", "metric", "value")}
-    columns |= {name: of_run[name].combine_chunks().take(index) for name in ("run", "point", "seed")}
-    columns |= {name: played[name].combine_chunks().take(index) for name in OF_RUN}
-    results = pa.table([columns[c.name].cast(c.type) for c in RESULTS], schema=RESULTS)
-    index, found = _exploded(played["alive"])
-    alive = {"run": played["run"].combine_chunks().take(index)} | {n: found.field(n) for n in ALIVE.names[1:]}
-    return _with_one_chance(_ordered(results, ("run", "team", "metric"))), pa.table(
-        [alive[c.name].cast(c.type) for c in ALIVE], schema=ALIVE
-    )
-
-
-def _exploded(column: pa.ChunkedArray) -> tuple[pa.Array, pa.StructArray]:
-    lists = column.combine_chunks()
-    if isinstance(lists, pa.ChunkedArray):
-        lists = lists.chunk(0)
-    return pc.list_parent_indices(lists), pc.list_flatten(lists)
+    @property
+    def alive(self) -> pa.Table:
+        """`ALIVE` of the finished runs."""
+        return self._tables[1]
 
 
 class MemoryStore:
@@ -215,14 +166,33 @@ class Store:
 
     def write_table(self, name: str, table: pa.Table) -> None:
         """Write a table, as a whole."""
-        draft = self.path / f"{name}.part"
+        self.write_tables({name: table.schema}, [(table,)])
+
+    def write_tables(self, files: Mapping[str, pa.Schema], rows: Iterable[tuple[pa.Table, ...]]) -> None:
+        """Write tables some runs at a time; each appears as a whole, in this order, when all are written.
+
+        Args:
+            files: Name of each file -> its columns.
+            rows: Further rows of each.
+        """
+        drafts = {self.path / name: self.path / f"{name}.part" for name in files}
         with reported(self.path):
             try:
-                draft.unlink(missing_ok=True)  # not what a link leads to
-                write_parquet(table, draft)
-                draft.replace(self.path / name)
+                with contextlib.ExitStack() as opened:
+                    for draft in drafts.values():
+                        draft.unlink(missing_ok=True)  # not what a link leads to
+                    writers = [
+                        opened.enter_context(ParquetBlocks(draft, schema))
+                        for draft, schema in zip(drafts.values(), files.values(), strict=True)
+                    ]
+                    for some in rows:
+                        for writer, table in zip(writers, some, strict=True):
+                            writer.add(table)
+                for target, draft in drafts.items():
+                    draft.replace(target)
             except OSError:
-                draft.unlink(missing_ok=True)
+                for draft in drafts.values():
+                    draft.unlink(missing_ok=True)
                 raise
 
     def write_folder(self, name: str, files: Mapping[str, bytes]) -> None:
@@ -327,20 +297,6 @@ def read_info(path: Path) -> dict[str, Any]:
     return BATCH.read(file)
 
 
-def read_played(path: Path) -> tuple[pa.Table, list[str]]:
-    """Finished runs that are not in the tables yet, and notes on what is damaged; of each file the intact rows are read.
-
-    Raises:
-        BatchError: A file holds something else.
-    """
-    parts, notes = [PLAYED.empty_table()], list[str]()
-    for file in sorted((path / PARTS).glob("*.arrow")):
-        batches = list(read_batches(file, [], BatchError, PLAYED, RULES, damage=notes, optional=LATER))
-        if batches:
-            parts.append(_completed(pa.Table.from_batches(batches), PLAYED).combine_chunks())
-    return pa.concat_tables(parts), notes
-
-
 def read_table(path: Path, name: str, columns: pa.Schema, notes: list[str] | None = None) -> pa.Table | None:
     """A table of a batch directory, without its damaged parts; None where there is none.
 
@@ -356,34 +312,26 @@ def read_table(path: Path, name: str, columns: pa.Schema, notes: list[str] | Non
     file = path / name
     if not file.exists():
         return None
-    table = _completed(read_parquet(file, columns, BatchError, notes=notes, optional=LATER), columns)
+    table = completed(read_parquet(file, columns, BatchError, notes=notes, optional=LATER), columns)
     check_values(zip(table.column_names, table.columns, strict=True), RULES, file, BatchError)
     return table
 
 
-def _completed(table: pa.Table, columns: pa.Schema) -> pa.Table:
-    """A table of a batch, in which columns that a former version did not write are 0: its runs are copies if all of a point end alike."""
-    for name in LATER:
-        if name in columns.names and name not in table.column_names:
-            place, column = columns.get_field_index(name), columns.field(name)
-            table = table.add_column(place, column, pa.array(np.zeros(table.num_rows), column.type))
-    return table
+def _read_design(path: Path, info: Mapping[str, Any]) -> pa.Table:
+    """The planned runs of a batch directory.
 
-
-def finished_in(results: pa.Table) -> Iterator[Finished]:
-    """The runs of a table of results, without the numbers of entities over time."""
-    runs = results["run"].to_numpy()
-    starts = np.flatnonzero(np.diff(runs, prepend=-1))
-    named = [results[name].to_pylist() for name in ("team", "metric", "value")]
-    of_run = results.select(["run", *OF_RUN]).take(pa.array(starts)).to_pylist()
-    stops = np.append(starts, len(runs))[1:]
-    for start, stop, first in zip(starts, stops, of_run, strict=True):
-        metrics = [
-            (team, name, math.nan if value is None else value)
-            for team, name, value in zip(*(column[start:stop] for column in named), strict=True)
-        ]
-        number, error = first.pop("run"), first.pop("error") or ""
-        yield Finished(number=number, error=error, metrics=metrics, alive=[], **first)
+    Raises:
+        BatchError: A file is missing, or cannot be read.
+    """
+    needed = TABLES if info["is_complete"] else (DESIGN_FILE,)
+    lacking = [f"{name} is missing" for name in needed if not (path / name).exists()]
+    design = read_table(path, DESIGN_FILE, DESIGN, lacking)
+    if design is None or lacking:
+        raise BatchError(
+            f"{path}: {lacking[0]}; the command of the batch writes it again, and plays only runs that are lost"
+        )
+    check_design(design, info, path / DESIGN_FILE)
+    return design
 
 
 def load(path: str | Path) -> StoredBatch:
@@ -394,24 +342,17 @@ def load(path: str | Path) -> StoredBatch:
     """
     path = Path(path)
     info = read_info(path)
-    needed = TABLES if info["is_complete"] else (DESIGN_FILE,)
-    lacking = [f"{name} is missing" for name in needed if not (path / name).exists()]
-    design = read_table(path, DESIGN_FILE, DESIGN, lacking)
-    if design is None or lacking:
-        raise BatchError(
-            f"{path}: {lacking[0]}; the command of the batch writes it again, and plays only runs that are lost"
-        )
-    check_design(design, info, path / DESIGN_FILE)
-    played, notes = read_played(path)
-    results, alive = merged(path, played, design, notes)
-    n = len(pc.unique(results["run"]))
+    design = _read_design(path, info)
+    notes: list[str] = []
+    stored = StoredBatch(path, info, design, FinishedRuns(path, design, notes), notes)
+    n = stored.runs.num_rows
     if not info["is_complete"]:
         notes.insert(0, f"the batch is not complete: {n} of {design.num_rows} runs are finished")
     elif notes:
         notes.append(
             f"{n} of {design.num_rows} runs are intact; the command of the batch plays the others again"
         )
-    return StoredBatch(path, info, design, results, alive, notes)
+    return stored
 
 
 def damage(path: Path, info: dict[str, Any]) -> list[str]:
@@ -425,63 +366,3 @@ def damage(path: Path, info: dict[str, Any]) -> list[str]:
         if read_table(path, name, columns, notes) is None and info["is_complete"]:
             notes.append(f"{name} is missing")
     return notes
-
-
-def merged(path: Path, played: pa.Table, design: pa.Table, notes: list[str]) -> tuple[pa.Table, pa.Table]:
-    """The tables of a directory, with the runs that are not in them yet, and without those that are damaged in one of the two.
-
-    Args:
-        path: The directory.
-        played: Finished runs of the parts.
-        design: The planned runs.
-        notes: Receives a line for each table that is damaged.
-
-    Raises:
-        BatchError: A table is another one.
-    """
-    old = read_table(path, RESULTS_FILE, RESULTS, notes)
-    n_notes = len(notes)
-    old_alive = read_table(path, ALIVE_FILE, ALIVE, notes)
-    if old is not None and old_alive is not None and len(notes) > n_notes:
-        old = old.filter(pc.is_in(old["run"], pc.unique(old_alive["run"]).cast(pa.int64())))
-    if old is not None and old_alive is None:
-        notes.append(f"{ALIVE_FILE} is missing")
-        old = None
-    for table, name in ((old, RESULTS_FILE), (old_alive, ALIVE_FILE)):
-        if table is not None:
-            check_results(table, design, path / name)
-    results, alive = tables(played, design)
-    for table in (results, alive):
-        check_values(zip(table.column_names, table.columns, strict=True), RULES, path / PARTS, BatchError)
-    # Each by its own runs: a batch that was killed at its end may have written one of the two.
-    results = _with_one_chance(_with_new(old, results, ("run", "team", "metric")))
-    check_metrics(results, path / RESULTS_FILE)
-    alive = _with_new(old_alive, alive, ("run", "t", "team"))
-    return results, alive.filter(
-        pc.is_in(alive["run"], pc.unique(results["run"]).cast(pa.int64()))
-    ) if notes else alive
-
-
-def _with_one_chance(results: pa.Table) -> pa.Table:
-    """A table of results in which plugins of all runs of a group draw if those of one do: which were in one stack is not told."""
-    chance, group = (results[name].to_numpy() for name in (CHANCE, GROUP))
-    is_drawn = np.isin(group, np.unique(group[chance == PLAYED_BY_CHANCE]))
-    place = results.schema.get_field_index(CHANCE)
-    column = pa.array(np.where(is_drawn, np.uint8(PLAYED_BY_CHANCE), chance))
-    return results.set_column(place, results.schema.field(place), column)
-
-
-def _with_new(old: pa.Table | None, new: pa.Table, order: tuple[str, ...]) -> pa.Table:
-    """A table with the rows of further runs, sorted."""
-    if old is None:
-        return new
-    new = new.filter(pc.invert(pc.is_in(new["run"], pc.unique(old["run"]).cast(pa.int64()))))
-    if not new.num_rows:
-        return old
-    return _ordered(pa.concat_tables([old, new]), order)
-
-
-def _ordered(table: pa.Table, names: tuple[str, ...]) -> pa.Table:
-    """A table sorted by some columns; rows without a team come before those of teams."""
-    keys = pa.table({n: table[n].fill_null(-(2**31)) if n == "team" else table[n] for n in names})
-    return table.take(pc.sort_indices(keys, sort_keys=[(name, "ascending") for name in names]))

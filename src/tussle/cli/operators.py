@@ -15,8 +15,8 @@ import typer
 from rich.console import RenderableType
 from rich.text import Text
 
+from tussle.batch.schemas import BATCH_FILE
 from tussle.batch.statistics import Mean, PairedComparison, mean_of, paired_difference
-from tussle.batch.store import BATCH_FILE
 from tussle.cli.orders import NOBODY, Giver, givers_of, is_run, shown_name
 from tussle.cli.tables import Row, estimate, indented, number_tables, title
 from tussle.cli.terminal import put, say_note

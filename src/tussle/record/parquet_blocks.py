@@ -9,7 +9,7 @@ import re
 import zlib
 from itertools import pairwise
 from pathlib import Path
-from typing import BinaryIO
+from typing import BinaryIO, Self
 
 import numpy as np
 import pyarrow as pa
@@ -20,8 +20,8 @@ from tussle.record.parquet_sizes import MAX_FOOTER
 
 ROWS_OF_GROUP = 8192
 """Rows of a row group, rounded down to whole runs. What a damaged byte destroys is the runs of its group."""
-MAX_GROUPS = 500
-"""Maximum number of row groups, so that the footer of a large table stays small."""
+GROUPS_OF_SIZE = 125
+"""Row groups after which they become twice as large, so that the footer of a large table stays small."""
 KEY = "checksums"
 """Name of the metadata entry with the end and CRC-32 of each row group, then the checksum of the footer."""
 _ENTRY = re.compile(rb"groups:((?:[0-9a-f]{24},)*) " + re.escape(MARK) + rb"([0-9a-f]{8})")
@@ -49,38 +49,75 @@ class _Sink:
         return data
 
 
+class ParquetBlocks:
+    """A table that is written some runs at a time. On leaving its `with` statement, the file is complete, unless an exception was raised.
+
+    Args:
+        path: The file.
+        schema: Its columns, one of them "run".
+
+    Raises:
+        OSError: The file cannot be written.
+    """
+
+    def __init__(self, path: Path, schema: pa.Schema) -> None:
+        self._sink, self._file = _Sink(), path.open("wb")
+        self._writer = pq.ParquetWriter(self._sink, schema, compression="zstd", write_page_checksum=True)
+        self._held = schema.empty_table()
+        self._ends: list[str] = []
+        self._end = 0
+
+    def add(self, table: pa.Table) -> None:
+        """Append rows, sorted by "run", of runs behind those that were added before."""
+        self._held = pa.concat_tables([self._held, table])
+        self._write(is_last=False)
+
+    def _write(self, is_last: bool) -> None:
+        """Write the row groups that are full, or all."""
+        run, first = self._held["run"].to_numpy(), 0
+        starts = np.append(np.flatnonzero(np.append(True, run[1:] != run[:-1])), len(run))
+        while first < len(run):
+            size = ROWS_OF_GROUP << (len(self._ends) // GROUPS_OF_SIZE)
+            if not is_last and first + size >= len(run):
+                break
+            last = int(starts[np.searchsorted(starts, first + size, "right") - 1])
+            if last <= first:  # a run that is larger
+                last = int(starts[np.searchsorted(starts, first, "right")])
+            self._write_group(self._held.slice(first, last - first))
+            first = last
+        self._held = self._held.slice(first)
+
+    def _write_group(self, rows: pa.Table) -> None:
+        self._writer.write_table(rows, row_group_size=len(rows))
+        data = self._sink.take()
+        self._end += len(data)
+        self._ends.append(f"{self._end:016x}{zlib.crc32(data):08x},")
+        self._file.write(data)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: object, *_: object) -> None:
+        with self._file:
+            if kind is not None:
+                return
+            self._write(is_last=True)
+            self._writer.add_key_value_metadata({KEY: f"groups:{''.join(self._ends)} {BLANK}"})
+            self._writer.close()
+            data = self._sink.take()
+            found = list(_ENTRY.finditer(data))[-1]
+            data[found.start(2) : found.end(2)] = as_digits(crc_with_zeros(data, found.start(2)))
+            self._file.write(data)
+
+
 def write_parquet(table: pa.Table, path: Path) -> None:
     """Write a table that is sorted by its column "run".
 
     Raises:
         OSError: The file cannot be written.
     """
-    sink, groups, end = _Sink(), "", 0
-    with path.open("wb") as file:
-        with pq.ParquetWriter(sink, table.schema, compression="zstd", write_page_checksum=True) as writer:
-            for first, last in _groups(table["run"].to_numpy()):
-                writer.write_table(table.slice(first, last - first), row_group_size=last - first)
-                data = sink.take()
-                end += len(data)
-                groups += f"{end:016x}{zlib.crc32(data):08x},"
-                file.write(data)
-            writer.add_key_value_metadata({KEY: f"groups:{groups} {BLANK}"})
-        data = sink.take()
-        found = list(_ENTRY.finditer(data))[-1]
-        data[found.start(2) : found.end(2)] = as_digits(crc_with_zeros(data, found.start(2)))
-        file.write(data)
-
-
-def _groups(run: np.ndarray) -> list[tuple[int, int]]:
-    """First row of each row group, and the row behind it."""
-    n = len(run)
-    size = max(ROWS_OF_GROUP, n // MAX_GROUPS)
-    starts = np.append(np.flatnonzero(np.append(True, run[1:] != run[:-1])), n) if n else np.zeros(1, int)
-    cuts = [0]
-    while cuts[-1] < n:
-        last = starts[np.searchsorted(starts, cuts[-1] + size, "right") - 1]
-        cuts.append(int(last if last > cuts[-1] else starts[np.searchsorted(starts, cuts[-1], "right")]))
-    return list(pairwise(cuts))
+    with ParquetBlocks(path, table.schema) as file:
+        file.add(table)
 
 
 def intact_groups(file: BinaryIO, size: int) -> tuple[list[int], int] | None:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 import pyarrow as pa
 import pyarrow.compute as pc
@@ -27,16 +28,8 @@ AT_ONCE = 65_536
 """Rows that are decoded before their size is checked."""
 
 
-def read_parquet(
-    path: Path,
-    wanted: pa.Schema,
-    error: type[TussleError],
-    only: Collection[str] | None = None,
-    most_rows: int = 2**40,
-    notes: list[str] | None = None,
-    optional: Collection[str] = (),
-) -> pa.Table:
-    """Read a table, without its damaged row groups.
+class ParquetTable:
+    """An untrusted table whose undamaged row groups are read one after another.
 
     Args:
         path: The file.
@@ -47,33 +40,79 @@ def read_parquet(
         notes: Receives a line if row groups are damaged, or if the file cannot be read; None if that is an error.
         optional: Names of required columns that files of older versions lack.
 
+    Attributes:
+        schema: Of the columns that are read.
+        is_readable: False as soon as the file cannot be read on.
+
     Raises:
         TussleError: As `error`: the file is not a regular file, is not such a table, is damaged, or takes too much memory for its
             size.
     """
-    try:
-        size = size_of(path)
-        most = MARGIN + MAX_EXPANSION * size
-        with path.open("rb") as opened:
-            groups = _intact_groups(path, opened, size, error, notes)
-            sizes = sizes_of(opened, size, groups)
-        if problem := _too_large(sizes, most, most_rows):
-            raise error(f"{path}: {problem}")
-        with pq.ParquetFile(path) as file:
-            schema = file.schema_arrow
-        if difference := same_columns(schema, wanted, optional):
-            raise error(f"{path}: is another table; {difference}")
-        names = [name for name in schema.names if only is None or name in only]
-        if problem := _columns_problem(schema, names):
-            raise error(f"{path}: {problem}")
-        texts = [name for name in names if _is_text(schema.field(name).type)]
-        with pq.ParquetFile(path, read_dictionary=texts, page_checksum_verification=True) as file:
-            return _decoded(file, pa.schema([schema.field(name) for name in names]), most, groups)
-    except (OSError, ValueError, TypeError, KeyError, pa.ArrowException) as reason:
-        if notes is not None:
-            notes.append(f"{path.name} cannot be read: {reason}")
-            return wanted.empty_table()
-        raise error(f"{path}: cannot be read: {reason}") from None
+
+    def __init__(
+        self,
+        path: Path,
+        wanted: pa.Schema,
+        error: type[TussleError],
+        only: Collection[str] | None = None,
+        most_rows: int = 2**40,
+        notes: list[str] | None = None,
+        optional: Collection[str] = (),
+    ) -> None:
+        self._path, self._error, self._notes = path, error, notes
+        self.schema, self.is_readable = wanted, True
+        self._groups: list[int] | None = None
+        with self._reported():
+            size = size_of(path)
+            self._most = MARGIN + MAX_EXPANSION * size
+            with path.open("rb") as opened:
+                self._groups = _intact_groups(path, opened, size, error, notes)
+                sizes = sizes_of(opened, size, self._groups)
+            if problem := _too_large(sizes, self._most, most_rows):
+                raise error(f"{path}: {problem}")
+            with pq.ParquetFile(path) as file:
+                schema = file.schema_arrow
+            if difference := same_columns(schema, wanted, optional):
+                raise error(f"{path}: is another table; {difference}")
+            names = [name for name in schema.names if only is None or name in only]
+            if problem := _columns_problem(schema, names):
+                raise error(f"{path}: {problem}")
+            self.schema = pa.schema([schema.field(name) for name in names])
+
+    def __iter__(self) -> Iterator[pa.RecordBatch]:
+        if not self.is_readable:
+            return
+        texts = [name for name in self.schema.names if _is_text(self.schema.field(name).type)]
+        with (
+            self._reported(),
+            pq.ParquetFile(self._path, read_dictionary=texts, page_checksum_verification=True) as file,
+        ):
+            batches = _decoded(file, self.schema, self._most, self._groups)
+            yield from batches if self._groups is not None else list(batches)  # of a damaged file, nothing
+
+    @contextmanager
+    def _reported(self) -> Iterator[None]:
+        """Tell why the file cannot be read."""
+        try:
+            yield
+        except (OSError, ValueError, TypeError, KeyError, pa.ArrowException) as reason:
+            self.is_readable = False
+            if self._notes is None:
+                raise self._error(f"{self._path}: cannot be read: {reason}") from None
+            self._notes.append(f"{self._path.name} cannot be read: {reason}")
+
+
+def read_parquet(path: Path, wanted: pa.Schema, *options: Any, **named: Any) -> pa.Table:
+    """Read a table, without its damaged row groups; the arguments are those of `ParquetTable`.
+
+    Raises:
+        TussleError: As `ParquetTable` does.
+    """
+    table = ParquetTable(path, wanted, *options, **named)
+    batches = list(table)
+    if not table.is_readable:
+        return wanted.empty_table()
+    return pa.Table.from_batches(batches, table.schema).combine_chunks()
 
 
 def _columns_problem(schema: pa.Schema, names: list[str]) -> str:
@@ -130,21 +169,23 @@ def _intact_groups(
     return intact
 
 
-def _decoded(file: pq.ParquetFile, schema: pa.Schema, most: int, groups: list[int] | None) -> pa.Table:
-    """Decode the rows in batches; texts stay dictionary-encoded until their size is known.
+def _decoded(
+    file: pq.ParquetFile, schema: pa.Schema, most: int, groups: list[int] | None
+) -> Iterator[pa.RecordBatch]:
+    """Decode the rows in batches, none of which has rows of two groups; texts stay dictionary-encoded until their size is known.
 
     Raises:
         ValueError: They take too much memory.
     """
-    batches, left = [], most
-    for batch in file.iter_batches(AT_ONCE, row_groups=groups, columns=schema.names):
-        batch.validate(full=True)
-        left -= sum(_length(column) for column in batch.columns)
-        if left < 0:
-            raise ValueError(f"it takes more than {most:,} bytes in memory")
-        columns = [column.cast(field.type) for column, field in zip(batch.columns, schema, strict=True)]
-        batches.append(pa.RecordBatch.from_arrays(columns, schema=schema))
-    return pa.Table.from_batches(batches, schema).combine_chunks()
+    left = most
+    for group in range(file.num_row_groups) if groups is None else groups:
+        for batch in file.iter_batches(AT_ONCE, row_groups=[group], columns=schema.names):
+            batch.validate(full=True)
+            left -= sum(_length(column) for column in batch.columns)
+            if left < 0:
+                raise ValueError(f"it takes more than {most:,} bytes in memory")
+            columns = [column.cast(field.type) for column, field in zip(batch.columns, schema, strict=True)]
+            yield pa.RecordBatch.from_arrays(columns, schema=schema)
 
 
 def _length(column: pa.Array) -> int:

@@ -53,9 +53,7 @@ def record_game(league: League, results: Results, pairing: Pairing, directory: P
             with Recorder(simulation, run):
                 simulation.run()
             played = simulation.state_hash()
-        wanted = results.table.filter(pc.equal(results.table["run"], pairing.decider))["state_hash"][
-            0
-        ].as_py()
+        wanted = results.runs.filter(pc.equal(results.runs["run"], pairing.decider))["state_hash"][0].as_py()
         if played != wanted:
             shutil.rmtree(run)
             raise BatchError(

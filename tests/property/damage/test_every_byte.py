@@ -10,7 +10,7 @@ import pytest
 from recorded_games import hunt, record
 
 from tussle import load_run
-from tussle.batch import Batch, InProcess, load_batch, store
+from tussle.batch import Batch, InProcess, load_batch, schemas, store
 from tussle.batch.damage import damage_in_batch
 from tussle.batch.schemas import BATCH
 from tussle.documents import Document
@@ -117,17 +117,17 @@ def test_each_flipped_byte_of_a_document_is_told_or_changes_no_value(run, batche
 
 
 def test_each_flipped_byte_of_a_batch_is_told(batches):
-    part = batches / "cut" / store.PARTS / "0001.arrow"
+    part = batches / "cut" / schemas.PARTS / "0001.arrow"
     rows = store.read_played(batches / "cut")[0].to_pylist()
     for at in flipped(part):
         found, notes = store.read_played(batches / "cut")
         assert notes or found.to_pylist() == rows, at  # all are there if only the end mark is damaged
         assert all(row in rows for row in found.to_pylist()), at
     table = load_batch(batches / "whole").table.to_pylist()
-    for name in (store.RESULTS_FILE, store.ALIVE_FILE, store.DESIGN_FILE):
+    for name in (schemas.RESULTS_FILE, schemas.ALIVE_FILE, schemas.DESIGN_FILE):
         for at in flipped(batches / "whole" / name):
             assert tells_groups(batches / "whole" / name), at
-            if at % READ_EVERY == 0 and name != store.DESIGN_FILE:
+            if at % READ_EVERY == 0 and name != schemas.DESIGN_FILE:
                 loaded = load_batch(batches / "whole")
                 assert all(row in table for row in loaded.table.to_pylist()), at
     assert damage_in_batch(batches / "whole") == ([], [])
@@ -137,9 +137,9 @@ def test_each_cut_of_a_file_is_told(run, batches):
     for size in cut(run / "events.arrow"):
         if size % READ_EVERY == 0:
             assert damage_in_run(run)[0], size
-    for at in cut(batches / "whole" / store.RESULTS_FILE):
-        assert tells_groups(batches / "whole" / store.RESULTS_FILE), at
-    part = batches / "cut" / store.PARTS / "0001.arrow"
+    for at in cut(batches / "whole" / schemas.RESULTS_FILE):
+        assert tells_groups(batches / "whole" / schemas.RESULTS_FILE), at
+    part = batches / "cut" / schemas.PARTS / "0001.arrow"
     rows = store.read_played(batches / "cut")[0].to_pylist()
     for size in cut(part):
         found = store.read_played(batches / "cut")[0].to_pylist()

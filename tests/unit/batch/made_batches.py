@@ -11,7 +11,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from tussle.batch import store
+from tussle.batch import finished_runs, schemas
 from tussle.batch.plan import BatchPlan
 from tussle.batch.store import StoredBatch
 from tussle.batch.tasks import Finished
@@ -57,18 +57,18 @@ def made_batch(
     ]
     plan = BatchPlan(list(points), shapes[0][0], first_seed=1, independent=independent)
     rows = [
-        store.row(_finished(run, by_run, metrics, alive, failed))
+        finished_runs.row(_finished(run, by_run, metrics, alive, failed))
         for run in range(plan.n_runs)
         if run not in missing
     ]
-    played = pa.Table.from_batches(rows, store.PLAYED)
+    played = pa.Table.from_batches(rows, schemas.PLAYED)
     if hashes:
         own = [
             hashes.get(run, old)
             for run, old in zip(played["run"].to_pylist(), played["state_hash"].to_pylist(), strict=True)
         ]
         played = played.set_column(played.schema.names.index("state_hash"), "state_hash", pa.array(own))
-    results, counts = store.tables(played, plan.table())
+    finished = finished_runs.tables(played, plan.table())
     info = {
         "format": 1, "tussle": "0.1", "name": "A made game", "mission": {"made_in": "python"}, "sample": sample, "sample_seed": 0,
         "variables": [variable_entry(v) for v in variables], "n_points": plan.n_points, "n_seeds": plan.n_seeds, "first_seed": 1,
@@ -76,7 +76,7 @@ def made_batch(
         "is_complete": not missing, "timings": {"wall_s": 1.0, "cpu_s": 1.0},
         "teams": {str(team): name for team, name in TEAMS.items()}, "dt": 0.1, "start": 0.0, "end": 100.0,
     }  # fmt: skip
-    return StoredBatch(None, info, plan.table(), results, counts, [])
+    return StoredBatch(None, info, plan.table(), [finished])
 
 
 def _finished(
@@ -117,12 +117,19 @@ def _unchanged() -> list[tuple[int, float, int]]:
     return [(team, t, START[team]) for team in (2, 3) for t in (0.0, 100.0)]
 
 
+def with_table(stored: StoredBatch, table: pa.Table, design: pa.Table | None = None) -> StoredBatch:
+    """The batch with other results."""
+    return StoredBatch(
+        None, stored.info, stored.design if design is None else design, [(table, stored.alive)]
+    )
+
+
 def write_batch(stored: StoredBatch, path: Path) -> Path:
     """Put a batch into a directory."""
     path.mkdir(parents=True)
-    put_whole(path / store.BATCH_FILE, json.dumps(plain(stored.info)))
+    put_whole(path / schemas.BATCH_FILE, json.dumps(plain(stored.info)))
     for name, table in (
-        (store.DESIGN_FILE, stored.design), (store.RESULTS_FILE, stored.table), (store.ALIVE_FILE, stored.alive)
+        (schemas.DESIGN_FILE, stored.design), (schemas.RESULTS_FILE, stored.table), (schemas.ALIVE_FILE, stored.alive)
     ):  # fmt: skip
         pq.write_table(table, path / name)
     return path

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-from dataclasses import replace
 
 import numpy as np
 import pyarrow as pa
@@ -12,7 +11,7 @@ import pyarrow.parquet as pq
 import pytest
 from made_batches import made_batch, write_batch
 
-from tussle.batch import load_batch, store
+from tussle.batch import load_batch, schemas, store
 from tussle.batch.store import Store
 from tussle.batch.variables import Choice, Range
 from tussle.errors import BatchError, RecordError
@@ -73,8 +72,8 @@ def change(path, table_name, **columns):
     ],
 )  # fmt: skip
 def test_a_field_of_the_batch_that_cannot_be_is_named(made, changed, said):
-    info = json.loads((made / store.BATCH_FILE).read_text())
-    (made / store.BATCH_FILE).write_text(json.dumps(info | changed))
+    info = json.loads((made / schemas.BATCH_FILE).read_text())
+    (made / schemas.BATCH_FILE).write_text(json.dumps(info | changed))
     with pytest.raises(BatchError, match=rf"batch\.json: {said}"):
         load_batch(made)
 
@@ -82,22 +81,22 @@ def test_a_field_of_the_batch_that_cannot_be_is_named(made, changed, said):
 @pytest.mark.parametrize(
     ("table", "columns", "said"),
     [
-        (store.DESIGN_FILE, {"run": np.arange(1, 13)}, "run = 1 in row 0 is not allowed; it is 0"),
+        (schemas.DESIGN_FILE, {"run": np.arange(1, 13)}, "run = 1 in row 0 is not allowed; it is 0"),
         (
-            store.DESIGN_FILE,
+            schemas.DESIGN_FILE,
             {"point": pa.array([7] * 12, pa.int32())},
             "point = 7 in row 0 is not allowed; it is 0",
         ),
         (
-            store.DESIGN_FILE,
+            schemas.DESIGN_FILE,
             {"seed": pa.array([5] * 12, pa.uint64())},
             "seed = 5 in row 0 is not allowed; it is 1",
         ),
-        (store.DESIGN_FILE, {"speed": None}, "has no column 'speed', which varies by batch.json"),
-        (store.DESIGN_FILE, {"speed": ["fast"] * 12}, "column 'speed' holds string, which no variable"),
-        (store.DESIGN_FILE, {"speed": [np.nan] * 12}, "column 'speed' lacks values"),
-        (store.DESIGN_FILE, {"tactic": [None, *["keep"] * 11]}, "column 'tactic' lacks values"),
-        (store.ALIVE_FILE, {"t": None}, "is another table; it has no column 't' of double"),
+        (schemas.DESIGN_FILE, {"speed": None}, "has no column 'speed', which varies by batch.json"),
+        (schemas.DESIGN_FILE, {"speed": ["fast"] * 12}, "column 'speed' holds string, which no variable"),
+        (schemas.DESIGN_FILE, {"speed": [np.nan] * 12}, "column 'speed' lacks values"),
+        (schemas.DESIGN_FILE, {"tactic": [None, *["keep"] * 11]}, "column 'tactic' lacks values"),
+        (schemas.ALIVE_FILE, {"t": None}, "is another table; it has no column 't' of double"),
     ],
 )
 def test_a_table_that_does_not_fit_is_named(made, table, columns, said):
@@ -118,29 +117,29 @@ def test_a_table_that_does_not_fit_is_named(made, table, columns, said):
         (
             "value",
             1e101,
-            "value = 1e.101 in row .* is not allowed; a metric is infinite, or 1e.100 at the most",
+            "value = 1e.101 of run .* is not allowed; a metric is infinite, or 1e.100 at the most",
         ),
         ("team", 9, "team 9 has one of the metrics 'alive' and 'start', and not the other"),
         ("metric", "a" * 300, r"quantity 'a+\.\.\.' has 303 characters"),
     ],
 )
 def test_a_row_of_the_results_that_does_not_fit_is_named(made, name, value, said):
-    column = pq.read_table(made / store.RESULTS_FILE)[name]
-    change(made, store.RESULTS_FILE, **{name: pa.array([*column.to_pylist()[:-1], value], column.type)})
+    column = pq.read_table(made / schemas.RESULTS_FILE)[name]
+    change(made, schemas.RESULTS_FILE, **{name: pa.array([*column.to_pylist()[:-1], value], column.type)})
     with pytest.raises(BatchError, match=rf"results\.parquet: {said}"):
         load_batch(made)
 
 
 def test_a_design_of_another_number_of_runs_is_refused(made):
-    table = pq.read_table(made / store.DESIGN_FILE)
+    table = pq.read_table(made / schemas.DESIGN_FILE)
     for n in (0, 3):
-        pq.write_table(table.slice(0, n), made / store.DESIGN_FILE)
+        pq.write_table(table.slice(0, n), made / schemas.DESIGN_FILE)
         with pytest.raises(BatchError, match=rf"has {n} runs; batch.json says 12, of 4 points"):
             load_batch(made)
 
 
 def test_results_that_would_make_a_far_larger_table_of_runs_are_refused(made):
-    table = pq.read_table(made / store.RESULTS_FILE)
+    table = pq.read_table(made / schemas.RESULTS_FILE)
     rows = table.take(pa.array(np.repeat(np.arange(len(table)), 200)))
     names = pa.array([f"m{i}" for i in range(len(rows))])
     for metric, team in (
@@ -151,7 +150,7 @@ def test_results_that_would_make_a_far_larger_table_of_runs_are_refused(made):
         ),
     ):
         changed = rows.set_column(4, "metric", metric).set_column(3, "team", team)
-        pq.write_table(changed, made / store.RESULTS_FILE)
+        pq.write_table(changed, made / schemas.RESULTS_FILE)
         with pytest.raises(
             BatchError, match=r"results\.parquet: [\d,]+ metrics of [\d,]+ teams in 12 runs are too many"
         ):
@@ -172,11 +171,11 @@ def test_a_lock_that_is_a_link_or_a_pipe_is_left_alone(made, tmp_path):
 
 def test_drafts_that_are_links_are_replaced_and_not_followed(made, tmp_path):
     (tmp_path / "mine").write_text("precious")
-    for name in (store.BATCH_FILE, store.DESIGN_FILE):
+    for name in (schemas.BATCH_FILE, schemas.DESIGN_FILE):
         (made / f"{name}.part").symlink_to(tmp_path / "mine")
     held = Store(made)
     held.write_info(held.info)
-    held.write_table(store.DESIGN_FILE, pq.read_table(made / store.DESIGN_FILE))
+    held.write_table(schemas.DESIGN_FILE, pq.read_table(made / schemas.DESIGN_FILE))
     held.close()
     assert (tmp_path / "mine").read_text() == "precious"
     assert load_batch(made).n_runs == 12
@@ -184,4 +183,4 @@ def test_drafts_that_are_links_are_replaced_and_not_followed(made, tmp_path):
 
 def test_a_batch_without_variables_and_with_seeds_of_their_own_is_read(tmp_path):
     stored = made_batch({2: np.ones((3, 1))}, independent=True)
-    assert load_batch(write_batch(replace(stored), tmp_path / "made")).n_runs == 3
+    assert load_batch(write_batch(stored, tmp_path / "made")).n_runs == 3

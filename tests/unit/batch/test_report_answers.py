@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import dataclasses
 import re
 
 import numpy as np
 import pyarrow.compute as pc
 import pytest
-from made_batches import made_batch
+from made_batches import made_batch, with_table
 from reported_batches import names_of, texts_of
 
 from tussle.batch.report.answers import _half_lost, answers
@@ -104,9 +103,8 @@ def test_one_seed_says_that_luck_is_not_known():
 
 def test_points_that_are_all_alike_are_told():
     stored = study([UAV], "lhs", 12)
-    stored.table = stored.table.set_column(
-        stored.table.schema.names.index("value"), "value", [[1.0] * stored.table.num_rows]
-    )
+    place = stored.table.schema.names.index("value")
+    stored = with_table(stored, stored.table.set_column(place, "value", [[1.0] * stored.table.num_rows]))
     assert (
         asked(stored).get("What matters?") is None or "same at all points" in asked(stored)["What matters?"]
     )
@@ -254,6 +252,6 @@ def test_no_time_is_told_of_losses_that_births_hide():
         stored.table["value"],
     )
     table = stored.table.set_column(stored.table.schema.names.index("value"), "value", value)
-    results = Results(dataclasses.replace(stored, table=table))
+    results = Results(with_table(stored, table))
     assert results.means(["lost[1]"])[0].value == 2.0
     assert np.isnan(_half_lost(results, 1))

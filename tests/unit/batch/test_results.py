@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 import time
 
@@ -12,12 +11,12 @@ import pandas as pd
 import polars as pl
 import pyarrow as pa
 import pytest
-from made_batches import START, made_batch, write_batch
+from made_batches import START, made_batch, with_table, write_batch
 
 from tussle.batch import Batch, InProcess, load_batch
 from tussle.batch.results import Results
+from tussle.batch.schemas import RESULTS
 from tussle.batch.statistics import mean_interval, mean_of, wilson
-from tussle.batch.store import RESULTS
 from tussle.batch.variables import Choice, Range
 from tussle.errors import ParameterError
 
@@ -72,7 +71,7 @@ def test_the_order_of_the_rows_does_not_matter(grid):
         scores(30, 4), variables=GRID, points=POINTS, failed={5: "boom", 6: "bang", 41: "boom"}
     )
     mixed = np.random.default_rng(1).permutation(stored.table.num_rows)
-    again = Results(dataclasses.replace(stored, table=stored.table.take(pa.array(mixed))))
+    again = Results(with_table(stored, stored.table.take(pa.array(mixed))))
     pd.testing.assert_frame_equal(again.frame("pandas"), grid.frame("pandas"))
 
 
@@ -313,12 +312,11 @@ def test_large_batches_are_tabled_without_a_loop_over_runs():
         }
     )
     table = pa.table([pa.array(columns[c.name]).cast(c.type) for c in RESULTS], schema=RESULTS)
-    stored = dataclasses.replace(small, table=table, design=design)
     began = time.process_time()
-    stored.table.slice(0, stored.table.num_rows // 20).to_pylist()
+    table.slice(0, table.num_rows // 20).to_pylist()
     as_objects = 20.0 * (time.process_time() - began)
     began = time.process_time()
-    results = Results(stored)
+    results = Results(with_table(small, table, design))
     spent = time.process_time() - began
     assert results.n_runs == n_runs
     np.testing.assert_array_equal(results.quantity("A.m7"), columns["value"][7::n_metrics])

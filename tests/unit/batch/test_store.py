@@ -9,23 +9,27 @@ import os
 import shutil
 import subprocess
 import warnings
+from itertools import pairwise
 
 import gambles
+import numpy as np
 import pyarrow as pa
+import pyarrow.compute as pc
 import pyarrow.parquet as pq
 import pytest
 
-from tussle.batch import Batch, InProcess, load_batch, store
+from tussle.batch import Batch, InProcess, finished_runs, load_batch, schemas, store
 from tussle.batch.damage import damage_in_batch
 from tussle.batch.plan import BatchPlan
 from tussle.batch.store import Store
 from tussle.batch.tasks import Finished
 from tussle.errors import BatchError, RecordError
+from tussle.record import parquet_blocks
 from tussle.record.arrow_file import read_batches
 from tussle.record.parquet_blocks import write_parquet
 from tussle.record.stream import Stream
 
-TABLES = (store.ALIVE_FILE, store.RESULTS_FILE, store.DESIGN_FILE)
+TABLES = (schemas.ALIVE_FILE, schemas.RESULTS_FILE, schemas.DESIGN_FILE)
 
 
 @pytest.fixture
@@ -61,12 +65,12 @@ def stopped(batch, path, after, until=None):
 
 def tables_of(path):
     """All that a batch directory holds for good, but for what it cost."""
-    results = pq.read_table(path / store.RESULTS_FILE).drop_columns(["cpu_s", "host"])
-    return results, pq.read_table(path / store.ALIVE_FILE), pq.read_table(path / store.DESIGN_FILE)
+    results = pq.read_table(path / schemas.RESULTS_FILE).drop_columns(["cpu_s", "host"])
+    return results, pq.read_table(path / schemas.ALIVE_FILE), pq.read_table(path / schemas.DESIGN_FILE)
 
 
 def facts_of(path):
-    info = json.loads((path / store.BATCH_FILE).read_text())
+    info = json.loads((path / schemas.BATCH_FILE).read_text())
     return {k: v for k, v in info.items() if k not in ("timings", "command", "checksum")}
 
 
@@ -82,11 +86,11 @@ def reference(mission, tmp_path):
 
 def as_before_chance_was_told(path):
     """Rewrite a batch directory as versions without the column `chance` have left it."""
-    if (path / store.RESULTS_FILE).exists():
-        older = pq.read_table(path / store.RESULTS_FILE).drop_columns([*store.LATER])
-        write_parquet(older, path / store.RESULTS_FILE)
-    schema = pa.schema([column for column in store.PLAYED if column.name not in store.LATER])
-    for part in list((path / store.PARTS).glob("*.arrow")):
+    if (path / schemas.RESULTS_FILE).exists():
+        older = pq.read_table(path / schemas.RESULTS_FILE).drop_columns([*schemas.LATER])
+        write_parquet(older, path / schemas.RESULTS_FILE)
+    schema = pa.schema([column for column in schemas.PLAYED if column.name not in schemas.LATER])
+    for part in list((path / schemas.PARTS).glob("*.arrow")):
         batches = list(read_batches(part, [], BatchError))
         part.unlink()
         stream = Stream(part, schema)
@@ -111,8 +115,64 @@ def test_directories_of_versions_that_did_not_tell_chance_are_read_and_gone_on_w
     assert found.n_distinct == wanted.n_distinct == 12
     results, *others = tables_of(path)
     wanted_results, *wanted_others = tables_of(reference)
-    assert results.drop_columns([*store.LATER]) == wanted_results.drop_columns([*store.LATER])
+    assert results.drop_columns([*schemas.LATER]) == wanted_results.drop_columns([*schemas.LATER])
     assert others == wanted_others
+
+
+# -- limits of memory ----------------------------------------------------------------------------------------------------------
+
+
+def test_limits_of_memory_at_their_smallest_change_nothing(mission, tmp_path, reference, monkeypatch):
+    """Some runs in tables, others in several files that are read again and again; the tables come a run at a time."""
+    wanted = load_batch(reference)
+    monkeypatch.setattr(finished_runs, "RUNS_AT_ONCE", 1)
+    monkeypatch.setattr(finished_runs, "MAX_OPEN_PARTS", 1)
+    monkeypatch.setattr(parquet_blocks, "ROWS_OF_GROUP", 1)
+    monkeypatch.setattr(store, "MAX_IN_PART", 2)
+    monkeypatch.setattr(store, "MAX_HELD", 0)
+    path = tmp_path / "out"
+    play(batch_of(mission, runs=2), path)
+    for after in (1, 3, 2):
+        stopped(batch_of(mission), path, after)
+        found = load_batch(path)
+        runs = found.runs["run"].to_pylist()
+        assert runs == sorted(set(found.table["run"].to_pylist()))
+        assert found.alive.equals(wanted.alive.filter(pc.is_in(wanted.alive["run"], pa.array(runs))))
+    play(batch_of(mission), path)
+    assert tables_of(path) == tables_of(reference)
+    found = load_batch(path)
+    assert found.alive.equals(wanted.alive)
+    timed = ["cpu_s", "host"]
+    assert found.table.drop_columns(timed).equals(wanted.table.drop_columns(timed))
+    assert found.runs.drop_columns(timed).equals(wanted.runs.drop_columns(timed))
+
+
+def test_a_table_read_later_holds_the_runs_that_were_there_when_the_batch_was_loaded(
+    mission, tmp_path, monkeypatch
+):
+    monkeypatch.setattr(store, "MAX_HELD", 0)
+    path = tmp_path / "out"
+    play(batch_of(mission, runs=2), path)
+    before = load_batch(path)
+    play(batch_of(mission), path)
+    assert before.runs["run"].to_pylist() == sorted(set(before.table["run"].to_pylist())) == [0, 1, 2, 3]
+    assert set(before.alive["run"].to_pylist()) <= {0, 1, 2, 3}
+
+
+@pytest.mark.parametrize("size", [1, 2, 7, 1000])
+def test_a_file_does_not_depend_on_how_many_rows_are_written_at_once(tmp_path, monkeypatch, size):
+    monkeypatch.setattr(parquet_blocks, "ROWS_OF_GROUP", 5)
+    monkeypatch.setattr(parquet_blocks, "GROUPS_OF_SIZE", 3)
+    table = pa.table({"run": np.repeat(np.arange(60), np.arange(60) % 13), "value": np.arange(340.0)})
+    write_parquet(table, tmp_path / "whole.parquet")
+    with parquet_blocks.ParquetBlocks(tmp_path / "parts.parquet", table.schema) as file:
+        for first in range(0, len(table), size):
+            file.add(table.slice(first, size))
+    assert (tmp_path / "parts.parquet").read_bytes() == (tmp_path / "whole.parquet").read_bytes()
+    groups = pq.ParquetFile(tmp_path / "whole.parquet")
+    runs = [set(groups.read_row_group(i)["run"].to_pylist()) for i in range(groups.num_row_groups)]
+    assert all(a.isdisjoint(b) for a, b in pairwise(runs))
+    assert len(runs) < 20  # groups grow
 
 
 # -- tables -------------------------------------------------------------------------------------------------------------------
@@ -126,9 +186,9 @@ def made(number, metrics, alive=(), **more):
 
 
 def tables(*finished, n=4):
-    batches = [store.row(f) for f in finished]
-    return store.tables(
-        pa.Table.from_batches(batches, store.PLAYED), BatchPlan([{"x": 1.5}], n, first_seed=7).table()
+    batches = [finished_runs.row(f) for f in finished]
+    return finished_runs.tables(
+        pa.Table.from_batches(batches, schemas.PLAYED), BatchPlan([{"x": 1.5}], n, first_seed=7).table()
     )
 
 
@@ -136,7 +196,7 @@ def test_a_run_is_a_row_for_each_team_and_metric_in_order():
     first = made(1, [(2, "score", 3.0), (1, "score", math.nan), (None, "M.n", 4.0), (1, "alive", math.inf)])
     second = made(0, [(1, "score", 1.0)], error="it fell", end="error", winner=1)
     results, _ = tables(first, second)
-    assert results.schema.equals(store.RESULTS)
+    assert results.schema.equals(schemas.RESULTS)
     assert [tuple(row[k] for k in ("run", "point", "seed", "team", "metric", "value")) for row in results.to_pylist()] == [
         (0, 0, 7, 1, "score", 1.0),
         (1, 0, 8, None, "M.n", 4.0),
@@ -163,7 +223,7 @@ def test_runs_come_back_from_their_table():
         made(0, [(None, "M.n", 4.0), (1, "score", 3.0), (2, "score", math.nan)], winner=1),
         made(3, [(1, "score", 0.0)], end="error", error="it fell", t=0.0, steps=0),
     ]
-    back = list(store.finished_in(tables(*runs)[0]))
+    back = list(finished_runs.finished_in(tables(*runs)[0]))
     assert repr(back) == repr(runs)
 
 
@@ -185,7 +245,7 @@ def test_a_batch_that_was_stopped_goes_on(mission, reference, tmp_path, after):
     assert results.notes == []
     assert tables_of(path) == tables_of(reference)
     assert facts_of(path) == facts_of(reference)
-    assert not (path / store.PARTS).exists()
+    assert not (path / schemas.PARTS).exists()
 
 
 def torn(state, tmp_path, mission, whole):
@@ -193,16 +253,16 @@ def torn(state, tmp_path, mission, whole):
     path = tmp_path / "torn"
     stopped(batch_of(mission), path, 5)
     stopped(batch_of(mission), path, 7)
-    order = [*TABLES, *sorted(p.name for p in (path / store.PARTS).iterdir())]
+    order = [*TABLES, *sorted(p.name for p in (path / schemas.PARTS).iterdir())]
     assert order[3:] == ["0001.arrow", "0002.arrow"]
     for name in order[:state]:
         if name.endswith(".arrow"):
-            (path / store.PARTS / name).unlink()
+            (path / schemas.PARTS / name).unlink()
         else:
             shutil.copy(whole / name, path / name)
     if state > len(order):
-        (path / store.PARTS).rmdir()
-    for name in [*TABLES, store.BATCH_FILE]:  # and always as another file was half written
+        (path / schemas.PARTS).rmdir()
+    for name in [*TABLES, schemas.BATCH_FILE]:  # and always as another file was half written
         (path / f"{name}.part").write_bytes(b"PAR1 and no more")
     return path
 
@@ -236,7 +296,7 @@ def test_a_batch_that_was_killed_as_it_was_extended_goes_on(mission, tmp_path, s
 def test_a_batch_that_was_killed_as_it_began_goes_on(mission, reference, tmp_path, gone):
     path = tmp_path / "out"
     stopped(batch_of(mission), path, 0)
-    shutil.rmtree(path / store.PARTS, ignore_errors=True)
+    shutil.rmtree(path / schemas.PARTS, ignore_errors=True)
     for name in gone:
         target = path / name
         if target.is_dir():
@@ -274,7 +334,7 @@ def test_a_complete_batch_without_one_of_its_tables_is_told_and_made_whole_by_it
         (path / name).write_bytes(made.get(data, data))
     (told,) = damage_in_batch(path)[0]
     assert name in told
-    if name == store.DESIGN_FILE or data is None:
+    if name == schemas.DESIGN_FILE or data is None:
         with pytest.raises(BatchError, match=f"{name} .*; the command of the batch writes it again"):
             load_batch(path)
     else:
@@ -289,21 +349,21 @@ def test_a_complete_batch_without_one_of_its_tables_is_told_and_made_whole_by_it
 def test_a_part_that_was_cut_at_any_byte_gives_its_whole_runs(mission, reference, tmp_path):
     path = tmp_path / "out"
     stopped(batch_of(mission), path, 4)
-    part = path / store.PARTS / "0001.arrow"
+    part = path / schemas.PARTS / "0001.arrow"
     data = part.read_bytes()
-    whole = store.read_played(path)[0]
-    assert whole.num_rows == 4
+    whole = store.load(path).table
+    assert len(store.load(path).runs) == 4
     n_rows = {}
     for size in [
         *range(0, len(data), 5),
         len(data),
     ]:  # five has no divisor in common with the eight bytes by which all is aligned
         part.write_bytes(data[:size])
-        played, notes = store.read_played(path)
-        assert played.equals(whole.slice(0, played.num_rows))
+        found = store.load(path)
+        assert found.table.equals(whole.slice(0, found.table.num_rows))
         # A cut between two runs looks like an end.
-        assert len(notes) <= 1
-        n_rows.setdefault(played.num_rows, size)
+        assert len(found.notes) <= 2
+        n_rows.setdefault(found.runs.num_rows, size)
     assert list(n_rows) == [0, 1, 2, 3, 4]
     # The directory goes on from each number of whole runs, and from the middle of one.
     for size in [*n_rows.values(), n_rows[2] - 5]:
@@ -317,18 +377,18 @@ def test_a_part_that_was_cut_at_any_byte_gives_its_whole_runs(mission, reference
 def test_zeros_at_the_end_of_a_part_are_no_runs(mission, tmp_path):
     path = tmp_path / "out"
     stopped(batch_of(mission), path, 4)
-    part = path / store.PARTS / "0001.arrow"
-    whole = store.read_played(path)[0]
+    part = path / schemas.PARTS / "0001.arrow"
+    whole = store.load(path).table
     with part.open("r+b") as file:
         file.truncate(part.stat().st_size - 8)  # the end mark, which a killed batch does not have
         file.truncate(part.stat().st_size + 4096)
-    assert store.read_played(path)[0].equals(whole)
+    assert store.load(path).table.equals(whole)
 
 
 # -- what is no batch, or a damaged one ---------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", [store.RESULTS_FILE, store.ALIVE_FILE])
+@pytest.mark.parametrize("name", [schemas.RESULTS_FILE, schemas.ALIVE_FILE])
 def test_a_table_that_is_damaged_is_told_and_never_believed(mission, reference, name):
     file = reference / name
     data = file.read_bytes()
@@ -355,7 +415,7 @@ def test_a_table_that_is_damaged_is_told_and_never_believed(mission, reference, 
     "text", ["", '{"format": 1, "name"', "[1, 2]", '{"format": 2}', '{"format": 1, "name": "x"}', "\udc80"]
 )
 def test_a_batch_file_that_says_something_else_is_refused(mission, reference, text):
-    (reference / store.BATCH_FILE).write_bytes(text.encode("utf-8", "surrogateescape"))
+    (reference / schemas.BATCH_FILE).write_bytes(text.encode("utf-8", "surrogateescape"))
     for attempt in (lambda: load_batch(reference), lambda: play(batch_of(mission), reference)):
         with pytest.raises(BatchError, match=r"batch\.json: "):
             attempt()

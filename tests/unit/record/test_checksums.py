@@ -13,7 +13,7 @@ from cli_process import call
 from recorded_games import hunt, record
 
 from tussle import load_run
-from tussle.batch import Batch, InProcess, load_batch, store
+from tussle.batch import Batch, InProcess, load_batch, schemas
 from tussle.batch.damage import damage_in_batch
 from tussle.errors import BatchError, RecordError
 from tussle.record import parquet_blocks, recorder
@@ -158,7 +158,7 @@ def test_the_runs_of_a_damaged_part_are_played_again(games, tmp_path):
     games.play(tmp_path / "whole", InProcess(1))
     with pytest.raises(Stopped):
         games.play(tmp_path / "out", InProcess(1), on_progress=stop)
-    part = next((tmp_path / "out" / store.PARTS).glob("*.arrow"))
+    part = next((tmp_path / "out" / schemas.PARTS).glob("*.arrow"))
     block = find_blocks(part).intact[2]
     flip(part, block.end - 40, 3)
     results = load_batch(tmp_path / "out")
