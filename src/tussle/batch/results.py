@@ -83,7 +83,7 @@ class Results:
         self._point: np.ndarray = facts["point"].to_numpy()
         self._seed_index: np.ndarray = self._run // max(1, len(self.points))
         self._is_failed = run_table.is_failed(facts)
-        self._columns = self._quantities_of(facts)
+        self._columns = run_table.quantities(stored.metrics, facts, list(self.teams))
         self._game = run_table.distinct_games(facts, self._is_failed, self._columns.values())
         self.n_distinct: int = len(np.unique(self._game[~self._is_failed]))
         if n_copies := self.n_runs - self.n_failed - self.n_distinct:
@@ -96,27 +96,6 @@ class Results:
         keyed = run_table.with_values(facts, self.design, names, self._columns)
         new = {n: pa.array(v) for n, v in self._columns.items() if n not in run_table.FACTS}
         self.runs: pa.Table = pa.table(keyed | new)
-
-    def _quantities_of(self, facts: pa.Table) -> dict[str, np.ndarray]:
-        metrics = self._stored.metrics
-        columns: dict[str, np.ndarray] = {}
-        scored = [team for team in self.teams if column_name("score", team) in metrics]
-        winner = run_table.floats(facts["winner"])
-        for team in scored:
-            columns[column_name("wins", team)] = (winner == team).astype(np.float64)
-        if scored:
-            columns["ties"] = np.isnan(winner).astype(np.float64)
-        for team in self.teams:
-            start, left = (metrics.get(column_name(name, team)) for name in ("start", "alive"))
-            if start is not None and left is not None:
-                columns[column_name("lost", team)] = start - left
-        columns["t"], columns["steps"] = (run_table.floats(facts[name]) for name in ("t", "steps"))
-        columns = metrics | columns
-        order = [column_name(metric, team) for metric in COUNTED for team in (*self.teams, None)]
-        columns = {name: columns[name] for name in dict.fromkeys([*order, *columns]) if name in columns}
-        if self._is_failed.any():
-            columns = {name: np.where(self._is_failed, np.nan, values) for name, values in columns.items()}
-        return columns
 
     @property
     def table(self) -> pa.Table:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
+from tussle.batch.default_quantities import COUNTED
 from tussle.batch.quantities import column_name
 from tussle.batch.schemas import CHANCE, OF_RUN, RESULTS
 
@@ -85,6 +86,36 @@ def is_failed(runs: pa.Table) -> np.ndarray:
     has_error = pc.fill_null(pc.not_equal(runs["error"], ""), False)
     failed: np.ndarray = pc.or_(has_error, pc.equal(runs["end"], "error")).to_numpy()
     return failed
+
+
+def quantities(
+    metrics: Mapping[str, np.ndarray], runs: pa.Table, teams: Sequence[int]
+) -> dict[str, np.ndarray]:
+    """All numbers of each run: metrics, wins and ties, losses, time and steps; NaN for runs that failed.
+
+    Args:
+        metrics: Name such as "score[2]" -> value for each run, (n_runs,).
+        runs: One row per run.
+        teams: Numbers of the teams.
+    """
+    columns: dict[str, np.ndarray] = {}
+    scored = [team for team in teams if column_name("score", team) in metrics]
+    winner = floats(runs["winner"])
+    for team in scored:
+        columns[column_name("wins", team)] = (winner == team).astype(np.float64)
+    if scored:
+        columns["ties"] = np.isnan(winner).astype(np.float64)
+    for team in teams:
+        start, left = (metrics.get(column_name(name, team)) for name in ("start", "alive"))
+        if start is not None and left is not None:
+            columns[column_name("lost", team)] = start - left
+    columns["t"], columns["steps"] = (floats(runs[name]) for name in ("t", "steps"))
+    columns = {**metrics, **columns}
+    order = [column_name(metric, team) for metric in COUNTED for team in (*teams, None)]
+    columns = {name: columns[name] for name in dict.fromkeys([*order, *columns]) if name in columns}
+    if (failed := is_failed(runs)).any():
+        columns = {name: np.where(failed, np.nan, values) for name, values in columns.items()}
+    return columns
 
 
 def with_values(
