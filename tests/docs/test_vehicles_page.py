@@ -45,10 +45,10 @@ def flown(name, substeps):
 @pytest.mark.parametrize("name", MODELS)
 def test_a_model_integrates_as_the_page_says(name):
     truth = flown(name, 512)
-    errors = [np.abs(flown(name, n) - truth).max() for n in (1, 2, 4, 8)]
+    errors = [np.abs(flown(name, n) - truth).max() for n in (1, 16, 32)]
     if "exact" in MODELS[name]:
         assert max(errors) < 1e-9
     else:
         assert "fourth order" in MODELS[name]
         assert errors[0] > 1e-7
-        assert 10.0 < errors[2] / errors[3] < 24.0  # 2^4, as far as the next order is small
+        assert 10.0 < errors[1] / errors[2] < 24.0  # 2^4, as far as the next order is small
