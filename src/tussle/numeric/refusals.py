@@ -70,7 +70,7 @@ def misread(annotation: Any) -> str:
         for each in block.body
         if isinstance(each, Assign)
         and getattr(each.value, "op", "") == "unary"
-        and each.value.fn is operator.neg
+        and each.value.fn is operator.neg  # type: ignore[attr-defined]
     }
 
     def is_negative(power: Any) -> bool:

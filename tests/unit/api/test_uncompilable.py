@@ -142,9 +142,7 @@ def test_functions_of_math_that_laws_cannot_call_are_named(cause, tmp_path, monk
 
 def test_a_law_that_the_compiler_refuses_is_named(tmp_path, monkeypatch):
     monkeypatch.setitem(PLACES, "law", "import math" + LAW)
-    with pytest.raises(
-        TussleError, match=r"mine\.py:\d+: V\.culprit cannot be compiled: "
-    ) as caught:
+    with pytest.raises(TussleError, match=r"mine\.py:\d+: V\.culprit cannot be compiled: ") as caught:
         built(tmp_path / "mine.py", "law", "math.fmod(offset_x, 2.0)").step()
     assert "\x1b" not in str(caught.value)
 
