@@ -12,7 +12,7 @@ from tussle.api import Autonomy, Input, Param
 from tussle.batch import Batch
 from tussle.declare import displays
 from tussle.declare.columns import Column
-from tussle.declare.displays import MAX_HTML, MAX_LINE, counted, listing, page, shortened, table
+from tussle.declare.displays import MAX_HTML, MAX_LINE, counted, decimals, listing, page, shortened, table
 from tussle.plugins import stock
 from tussle.stock import Boids, SimpleCapture, SimpleCaptureMetrics, Still, Unicycle
 
@@ -207,3 +207,16 @@ def test_tables_say_what_they_leave_out():
 )  # fmt: skip
 def test_numbers_are_written_in_one_way(value, digits, text):
     assert displays.number(value, digits) == text
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("power", [-300, -40, -12, -9, -3, 0, 5, 14, 15, 16, 99, 300])
+def test_estimates_of_any_size_are_short_and_keep_the_digits_of_their_interval(power, sign):
+    """A quantity in an unusual unit is neither shown as 0 nor with a hundred digits."""
+    low, high = sorted((sign * 1.2345 * 10.0**power, sign * 1.5678 * 10.0**power))
+    digits = 1 - math.floor(math.log10(high - low))
+    for value in (low, high):
+        text = decimals(value, digits)
+        assert len(text) <= 20
+        assert float(text.replace(",", "")) == pytest.approx(value, abs=0.5000001 * 10.0**-digits)
+    assert decimals(0.0, 30) == "0.000000000"

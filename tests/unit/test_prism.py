@@ -59,6 +59,9 @@ def test_pictures_show_its_walls_from_outside():
     ("values", "text"),
     [
         ({"corners": ((0, 0), (1, 0))}, "2 corners; it takes 3 to 1000"),
+        ({"corners": ((0, 0), (1, 1), (2, 2))}, "all of them lie on one line"),
+        ({"corners": ((0.1, 0.3), (0.2, 0.6), (0.3, 0.9), (0.1, 0.3))}, "all of them lie on one line"),
+        ({"corners": ((5, 5), (5, 5), (5, 5))}, "all of them lie on one line"),
         ({"corners": ((0, 0), (1, 0), (0, np.inf))}, "finite numbers"),
         ({"corners": CORNERS, "low": 2.0, "high": 2.0}, "Prism.high = 2.0.*> 2"),
     ],

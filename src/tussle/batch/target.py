@@ -16,6 +16,7 @@ from tussle.batch.selection import written
 from tussle.batch.sequential_intervals import sequential_interval
 from tussle.batch.statistics import LEVEL
 from tussle.batch.variables import Choice, Range, Variable
+from tussle.declare.displays import decimals
 from tussle.errors import ParameterError, listed, nearest_name
 
 if TYPE_CHECKING:
@@ -134,7 +135,7 @@ class Crossing:
         if not self.high > self.low:
             return f"{self.value:.3g} ({self.low:.3g} or more)"
         digits = max(-math.floor(math.log10(self.high - self.low)), 0)
-        value, low, high = (f"{number:,.{digits}f}" for number in (self.value, self.low, self.high))
+        value, low, high = (decimals(number, digits) for number in (self.value, self.low, self.high))
         return f"{value} ({low} to {high})"
 
 

@@ -24,6 +24,7 @@ from tussle.cli.orders import analyze_run, is_run
 from tussle.cli.progress import home_short
 from tussle.cli.tables import Cell, Row, indented, number_tables, title
 from tussle.cli.terminal import out, put, say_note
+from tussle.declare.displays import decimals
 from tussle.errors import ParameterError
 
 MAX_POINTS = 20
@@ -296,17 +297,17 @@ def _failures(found: Analysis) -> Iterable[RenderableType]:
 def _digits(width: float, value: float) -> int:
     """Return significant decimals: two digits of the width of an interval, or four of the value if the width is not known."""
     if math.isfinite(width) and width > 0.0:
-        return min(max(1 - math.floor(math.log10(width)), 0), 9)
+        return max(1 - math.floor(math.log10(width)), 0)
     if not math.isfinite(value) or value == 0.0 or float(value).is_integer():
         return 0
-    return min(max(3 - math.floor(math.log10(abs(value))), 0), 9)
+    return max(3 - math.floor(math.log10(abs(value))), 0)
 
 
 def _number(value: float | None, digits: int, sign: str = "") -> str:
-    return "" if value is None or not math.isfinite(value) else f"{value:{sign}z,.{digits}f}"
+    return "" if value is None or not math.isfinite(value) else decimals(value, digits, sign)
 
 
 def _interval(low: float, high: float, digits: int) -> str:
     if not (math.isfinite(low) and math.isfinite(high)):
         return ""
-    return f"{low:z,.{digits}f} – {high:z,.{digits}f}"
+    return f"{decimals(low, digits)} – {decimals(high, digits)}"

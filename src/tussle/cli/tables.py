@@ -14,6 +14,7 @@ from rich.table import Table
 from rich.text import Text
 
 from tussle.cli.terminal import out
+from tussle.declare.displays import decimals
 
 Cell = str | Text
 Row = tuple[str, Sequence[Cell]]
@@ -127,4 +128,5 @@ def estimate(value: float, low: float, high: float) -> str:
         return f"{value:.6g}"
     digits = max(0, 1 - math.floor(math.log10(high - low)))
     to = "–" if low >= 0.0 else " to "
-    return f"{value:.{digits}f} ({low:.{digits}f}{to}{high:.{digits}f})"
+    value_text, low_text, high_text = (decimals(each, digits, comma="") for each in (value, low, high))
+    return f"{value_text} ({low_text}{to}{high_text})"

@@ -315,7 +315,7 @@ class Param(Numbers):
         if self.dtype is bool or isinstance(value, (bool, np.bool_)):
             raise self._error(where, value, self.allowed())
         if isinstance(value, int) and abs(value) > MAX_NUMBER:  # which may be more than a float holds
-            raise self._error(where, value, f"{self.allowed()} and of at most {MAX_NUMBER:g}")
+            raise self._error(where, value, f"{self.allowed()}, of at most {MAX_NUMBER:g}")
         if not isinstance(value, (int, float, np.integer, np.floating)) or math.isnan(value):
             raise self._error(where, value, self.allowed())
         is_inexact = isinstance(value, float) and not abs(value) <= MAX_INTEGER
@@ -327,7 +327,7 @@ class Param(Numbers):
         if self.dtype is int and not -(2**63) <= number < 2**63:
             raise self._error(where, value, f"{self.allowed()} of 64 bits")
         if MAX_NUMBER < abs(number) < math.inf:
-            raise self._error(where, value, f"{self.allowed()} and of at most {MAX_NUMBER:g}")
+            raise self._error(where, value, f"{self.allowed()}, of at most {MAX_NUMBER:g}")
         return number
 
     def is_within(self, number: float) -> bool:
@@ -348,7 +348,8 @@ class Param(Numbers):
 
     def _error(self, where: str, value: Any, allowed: str) -> ParameterError:
         guess = nearest_name(value, self.choices) if isinstance(value, str) and self.is_text else ""
-        return ParameterError(f"{self._place(where)} = {value!r} is not allowed{guess}; it takes {allowed}")
+        shown = value.item() if isinstance(value, np.generic) else value
+        return ParameterError(f"{self._place(where)} = {shown!r} is not allowed{guess}; it takes {allowed}")
 
     def __get__(self, instance: object | None, owner: type) -> Any:
         if instance is None:

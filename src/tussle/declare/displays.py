@@ -5,6 +5,7 @@ Whatever is shown, the HTML is escaped, uses the colours of the page that it is 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from html import escape
 from itertools import islice
@@ -19,6 +20,8 @@ MAX_LISTED = 6
 MAX_COLUMNS = 12
 WHOLE = 1e9
 """Real numbers below it are written without an exponent."""
+MAX_DECIMALS, MAX_WRITTEN_OUT = 9, 1e15
+"""Decimals, and size, of numbers in tables that have no exponent."""
 CELL = 'style="padding:1px 10px 1px 0;text-align:left;vertical-align:top"'
 
 
@@ -57,6 +60,15 @@ def number(value: Any, digits: int = 6) -> str:
         return f"{value:,.0f}"
     mantissa, _, exponent = f"{value:,.{digits}g}".partition("e")
     return f"{mantissa}e{int(exponent)}" if exponent else mantissa
+
+
+def decimals(value: float, digits: int, sign: str = "", comma: str = ",") -> str:
+    """Return a number to so many decimals: "1,234.50"; where that takes more than nine, or from 10^15 on, "1.25e-11", to the same place."""
+    if value == 0.0 or not math.isfinite(value) or (digits <= MAX_DECIMALS and abs(value) < MAX_WRITTEN_OUT):
+        return f"{value:{sign}z{comma}.{min(max(digits, 0), MAX_DECIMALS)}f}"
+    figures = min(max(math.floor(math.log10(abs(value))) + digits, 0), 15)
+    mantissa, _, exponent = f"{value:{sign}.{figures}e}".partition("e")
+    return f"{mantissa}e{int(exponent)}"
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[Any]], room: int = MAX_TABLE) -> str:

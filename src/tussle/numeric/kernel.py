@@ -27,7 +27,7 @@ from tussle.numeric import processor, store
 from tussle.numeric.device_compiler import device_compiler, set_environments, share_constants
 from tussle.numeric.fingerprint import Fingerprint, of_author, package
 from tussle.numeric.operator_types import type_numbers
-from tussle.numeric.refusals import compiler_errors, label, refusal
+from tussle.numeric.refusals import compiler_errors, label, misread, refusal
 from tussle.numeric.source import GENERATED
 
 Code = str | tuple[str, ...]
@@ -409,13 +409,29 @@ class Kernel(Device):
             with compiling(), collecting_later():
                 main.compile(self.types)
         except compiler_errors() as error:
-            if self.py_func.__code__.co_filename == GENERATED:  # who has generated it knows of whom
-                raise
-            raise DeclarationError(f"{label(self.py_func)} cannot be compiled: {refusal(error)}") from error
+            authors = [self.py_func]
+            if self.py_func.__code__.co_filename == GENERATED:
+                authors = vars(self.py_func).get("authors", [])
+                if not authors:  # who has generated it knows of whom
+                    raise
+            raise DeclarationError(
+                f"{', '.join(map(label, authors))} cannot be compiled: {refusal(error)}"
+            ) from error
         stats.compiled += 1
+        self._check(main, reached)
         result = next(iter(main.overloads.values()))
         set_environments(result.library)
         return result
+
+    def _check(self, main: Any, reached: Fingerprint) -> None:
+        """Refuse functions of authors that the compiler reads otherwise than Python."""
+        devices = [each for each in reached.holders if isinstance(each, Device)]
+        for each, dispatcher in [(self, main), *((each, each.dispatcher) for each in devices)]:
+            if package(each.py_func) == "tussle" or each.py_func.__code__.co_filename == GENERATED:
+                continue
+            for result in dispatcher.overloads.values():
+                if result.type_annotation is not None and (why := misread(result.type_annotation)):
+                    raise DeclarationError(f"{label(each.py_func)} cannot be compiled: {why}")
 
     def _accept(self, *args: Any) -> Any:
         """Called by the dispatcher for new argument types: register them if they match the signature. Never compiles."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 import re
 from collections.abc import Callable
 from typing import Any
@@ -53,3 +54,36 @@ def refusal(error: Exception) -> str:
                 f"{name} is a {kind}: compiled functions take numbers, texts, tuples and arrays from outside"
             )
     return "\n".join(lines)
+
+
+def misread(annotation: Any) -> str:
+    """What the compiler reads otherwise than Python in a function whose types it has found, with its line; "" if nothing.
+
+    A negative power of a whole number is a whole number to it, mostly 0, and `range` cuts real numbers off, and to 32 bits.
+    """
+    from numba.core.ir import Assign
+    from numba.core.types import Float, Integer, Literal
+
+    negative = {
+        each.target.name
+        for block in annotation.blocks.values()
+        for each in block.body
+        if isinstance(each, Assign)
+        and getattr(each.value, "op", "") == "unary"
+        and each.value.fn is operator.neg  # type: ignore[attr-defined]
+    }
+
+    def is_negative(power: Any) -> bool:
+        kind = annotation.typemap[power.name]
+        return power.name in negative or (isinstance(kind, Literal) and kind.literal_value < 0)  # type: ignore[attr-defined]
+
+    for each in annotation.calltypes:
+        if getattr(each, "op", "") in ("binop", "inplace_binop") and each.fn in (operator.pow, operator.ipow):
+            kinds = [annotation.typemap[side.name] for side in (each.lhs, each.rhs)]
+            if all(isinstance(kind, Integer) for kind in kinds) and is_negative(each.rhs):
+                return f"line {each.loc.line}: a negative power of a whole number would be a whole number: write 2.0 ** -k, not 2 ** -k"
+        elif getattr(each, "op", "") == "call":
+            called = getattr(annotation.typemap[each.func.name], "typing_key", None)
+            if called is range and any(isinstance(annotation.typemap[a.name], Float) for a in each.args):
+                return f"line {each.loc.line}: range takes whole numbers: write range(int(x))"
+    return ""

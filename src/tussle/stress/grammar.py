@@ -30,6 +30,8 @@ MAX_LENGTH = 1000
 """Characters of a specification."""
 MAX_DEPTH = 50
 """Nested parentheses and operators."""
+MAX_SAMPLES = 2**60
+"""Samples before a window."""
 WORDS = ("always", "eventually", "until", "and", "or", "not", "inf")
 TOKEN = re.compile(
     r"""\s*(?:
@@ -59,11 +61,13 @@ class SpecificationReader:
         text: The specification.
         factory: Makes signals.
         dt: Time of a sample [s].
+        length: Time that a game lasts at most [s].
     """
 
-    def __init__(self, text: str, factory: Factory, dt: float) -> None:
-        self.text, self.factory, self.dt = text, factory, dt
+    def __init__(self, text: str, factory: Factory, dt: float, length: float = math.inf) -> None:
+        self.text, self.factory, self.dt, self.length = text, factory, dt, length
         self.place, self.depth = 0, 0
+        self.after = 0  # samples from the start of the game to where the windows outside begin
         self.terms: dict[str, SignalTerm] = {}
 
     def read(self) -> Formula:
@@ -143,7 +147,7 @@ class SpecificationReader:
         found = self._unary()
         if self._takes("until"):
             first, last = self._window()
-            return UntilHolds(self._formula(found), self._formula(self._unary()), first, last)
+            return UntilHolds(self._formula(found), self._inside(first), first, last)
         return found
 
     def _unary(self) -> Formula | SignalTerm:
@@ -153,11 +157,18 @@ class SpecificationReader:
         word = self._takes("not", "always", "eventually")
         if word:
             first, last = (0, 0) if word == "not" else self._window()
-            inner = self._formula(self._unary())
+            inner = self._inside(first)
             found = negated(inner) if word == "not" else Window(inner, first, last, word == "eventually")
         else:
             found = self._compared()  # type: ignore[assignment]
         self.depth -= 1
+        return found
+
+    def _inside(self, first: int) -> Formula:
+        """What is judged from the sample on at which a window begins."""
+        self.after += first
+        found = self._formula(self._unary())
+        self.after -= first
         return found
 
     def _window(self) -> tuple[int, int | None]:
@@ -172,8 +183,13 @@ class SpecificationReader:
         if not first <= last:
             raise self._wrong("a window ends before it begins", start)
         # The samples within the window, whatever the rounding of its ends.
-        n = math.ceil(first / self.dt - 1e-6)
-        return n, None if last == math.inf else max(n - 1, math.floor(last / self.dt + 1e-6))
+        n = math.ceil(min(first / self.dt, MAX_SAMPLES) - 1e-6)
+        end = None if last == math.inf else math.floor(last / self.dt + 1e-6)
+        if end is not None and end < n:
+            raise self._wrong(f"no step is within the window; steps are {self.dt:g} s apart", start)
+        if (self.after + n - 0.5) * self.dt > self.length:
+            raise self._wrong(f"the window begins after the end of the game, at {self.length:g} s", start)
+        return n, end
 
     def _time(self) -> float:
         if self._takes("inf"):

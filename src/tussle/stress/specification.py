@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -60,7 +61,8 @@ class Specification:
         if (file := text.rpartition(":")[0]).endswith(".py"):
             function = function_of(Path(file), text.rpartition(":")[2])
             return cls.of_function(function, mission, text)
-        reader = SpecificationReader(text, Factory(mission, functions or {}), mission.dt)
+        length = mission.end - mission.start if "time" in mission.end_conditions else math.inf
+        reader = SpecificationReader(text, Factory(mission, functions or {}), mission.dt, length)
         formula = reader.read()
         if not any(isinstance(p, OfStep | AtEnd) for term in reader.terms.values() for p in term.parts()):
             raise ParameterError(f"specification {text!r} names nothing of a game: a signal or a quantity")

@@ -28,7 +28,7 @@ class Prism(Volume):
         high: z of the upper end [m].
 
     Raises:
-        ParameterError: A value is not finite, the count of corners is out of bounds, or low is not below high.
+        ParameterError: A value is not finite, the count of corners is out of bounds, all lie on one line, or low is not below high.
     """
 
     corners: Sequence[Sequence[float]]
@@ -44,6 +44,12 @@ class Prism(Volume):
             )
         if not all(math.isfinite(value) for corner in corners for value in corner):
             raise ParameterError(f"Prism.corners = {corners!r} is not allowed; it takes finite numbers")
+        offset = np.array(corners).T - np.array(corners[0])[:, None]
+        farthest = offset[:, np.argmax((offset * offset).sum(axis=0))]
+        across = np.abs(offset[0] * farthest[1] - offset[1] * farthest[0]).max()
+        # Rounding errors of these products, as for `Polyhedron`.
+        if across <= 64.0 * np.finfo(np.float64).eps * np.abs(corners).max() * np.abs(farthest).max():
+            raise ParameterError(f"Prism.corners = {corners!r} is not allowed; all of them lie on one line")
         object.__setattr__(self, "low", checked_number(self, "low"))
         object.__setattr__(self, "high", checked_number(self, "high", above=self.low))
 

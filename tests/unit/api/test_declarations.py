@@ -88,6 +88,8 @@ def test_values_are_taken_in_si(name, given, value):
         ("count", math.nan, r"Sample.count = nan is not allowed"),
         ("count", math.inf, r"Sample.count = inf is not allowed"),
         ("speed", 10**400, r"Sample.speed = 10{400} is not allowed; .* of at most 1e\+30"),
+        ("speed", np.float64(1e300), r"Sample.speed = 1e\+300 is not allowed"),
+        ("count", np.int64(10), r"Sample.count = 10 is not allowed"),
         ("count", -(10**400), r"Sample.count = -10{400} is not allowed"),
         ("is_on", 2, r"Sample.is_on = 2 is not allowed; it takes true or false"),
         ("is_on", "maybe", r"Sample.is_on = 'maybe' is not allowed"),

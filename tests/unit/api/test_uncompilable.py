@@ -30,6 +30,9 @@ CAUSES = {
     "an object": ("THING.x", "THING is a"),
     "a name that is not there": ("nowhere", "name 'nowhere' is not defined"),
     "a function that NumPy lacks": ("np.nothing_like_it(1.0)", "nothing_like_it"),
+    "a negative power of a whole number": ("2 ** -int(1.5)", "write 2.0 ** -k, not 2 ** -k"),
+    "another": ("int(2.5) ** -1", "write 2.0 ** -k"),
+    "a range of a real number": ("len(range(2.5))", r"range takes whole numbers"),
     "a text as a number": ("'a' * 1.5", "No implementation of function"),
 }
 PLACES = {
@@ -38,6 +41,20 @@ PLACES = {
 def culprit(x, y):
     for i in range(x.shape[0]):
         y[i] = {cause}
+class V(Autonomy):
+    \"\"\"Calls a kernel.\"\"\"
+    velocity = Output("velocity_x velocity_y velocity_z", unit="m/s")
+    def step(self, g):
+        culprit(g.components("pos")[0], self.velocity[0])
+""",
+    "device": """
+@device
+def inner(x):  # culprit, too
+    return {cause}
+@kernel("F Fw")
+def culprit(x, y):
+    for i in range(x.shape[0]):
+        y[i] = inner(x[i])
 class V(Autonomy):
     \"\"\"Calls a kernel.\"\"\"
     velocity = Output("velocity_x velocity_y velocity_z", unit="m/s")
@@ -92,12 +109,42 @@ def test_the_error_tells_the_function_its_place_and_the_cause(place, cause, tmp_
     text = str(caught.value)
     assert told in text
     assert (
-        re.search(r"mine\.py:\d+: (V\.)?(culprit|derivative) cannot be compiled: ", text)
+        re.search(r"mine\.py:\d+: (V\.)?(culprit|inner|derivative) cannot be compiled: ", text)
         or "AttributeError" in text
     )
     assert re.search(r"mine\.py:\d+: ", text)
     for word in ("\x1b", "nopython", "<generated>", "During:", "kernels.py"):
         assert word not in text
+
+
+LAW = """
+class V(Autonomy):
+    \"\"\"A neighbour law.\"\"\"
+    velocity = Output("velocity_x velocity_y velocity_z", unit="m/s")
+    @neighbors(100.0, n="sum")
+    @staticmethod
+    def culprit(offset_x):
+        return {cause}
+    def step(self, g):
+        self.velocity[0] = self.culprit(g).n
+"""
+
+
+@pytest.mark.parametrize(
+    "cause", ["math.floor(offset_x)", "math.isnan(offset_x)", "math.gcd(1, 2)", "math.dist(offset_x, 1.0)"]
+)
+def test_functions_of_math_that_laws_cannot_call_are_named(cause, tmp_path, monkeypatch):
+    monkeypatch.setitem(PLACES, "law", "import math" + LAW)
+    with pytest.raises(TussleError, match=r"V\.culprit: `math\.\w+` cannot be called here") as caught:
+        built(tmp_path / "mine.py", "law", cause).step()
+    assert "\x1b" not in str(caught.value)
+
+
+def test_a_law_that_the_compiler_refuses_is_named(tmp_path, monkeypatch):
+    monkeypatch.setitem(PLACES, "law", "import math" + LAW)
+    with pytest.raises(TussleError, match=r"mine\.py:\d+: V\.culprit cannot be compiled: ") as caught:
+        built(tmp_path / "mine.py", "law", "math.fmod(offset_x, 2.0)").step()
+    assert "\x1b" not in str(caught.value)
 
 
 def test_what_the_compiler_says_about_itself_is_left_out():

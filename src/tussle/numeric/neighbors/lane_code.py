@@ -362,7 +362,7 @@ class Writer:
             return [Value(names[0])] if function is float else [Value(self.truth(given[0]), True)]
         if function is numeric.sincos:
             return [self.lane_by_lane(each, names) for each in (numeric.sin, numeric.cos)]
-        if isinstance(function, Device) or getattr(function, "__module__", "") == "math":
+        if isinstance(function, Device) or is_real(function, len(names)):
             return [self.lane_by_lane(function, names)]
         raise self.refusal(node, f"`{ast.unparse(node.func)}` cannot be called here")
 
@@ -384,6 +384,18 @@ class Writer:
         self.scope[name] = function
         one = (f"{name}({', '.join(f'lane_of({a}, {k})' for a in names)})" for k in range(LANES))
         return self.new(f"joined({', '.join(one)})")
+
+
+def is_real(function: Any, n: int) -> bool:
+    """Return True if a function is one of `math` that gives real numbers, unlike `math.floor`."""
+    if getattr(function, "__module__", "") != "math":
+        return False
+    try:
+        return isinstance(function(*[0.5] * n), float)
+    except (ValueError, OverflowError):
+        return True
+    except TypeError:
+        return False
 
 
 def has_return(node: ast.AST) -> bool:

@@ -159,8 +159,10 @@ def make_walk(laws: Sequence[Law], where: Law | None, code_of: Callable[[str], s
     out = "(I2w F2w) i8 (i8 i8) i8 -> i8" if text.lists_pairs else "F2w i8 (i8 i8) i8"
 
     def written(lines: Iterable[str], points: str, suffix: str) -> Kernel:
-        names = (law.function.__qualname__ for law in (*laws, *([where] if where else [])))
-        made = define(lines, scope, laws[0].function.__module__, "+".join(names) + suffix)
+        authors = [law.function for law in (*laws, *([where] if where else []))]
+        names = "+".join(each.__qualname__ for each in authors)
+        made = define(lines, scope, laws[0].function.__module__, names + suffix)
+        vars(made)["authors"] = authors
         return kernel(f"(I2 I2 I) ({points}) ({other}) ({own}) {out}")(made)
 
     kernel_of_blocks = written(text.lines(), "F2 F2", "")
