@@ -571,7 +571,9 @@ def _whole_numbers(where: str, given: Any, allowed: str) -> tuple[int, ...]:
     return tuple(map(int, found))
 
 
-def _check_seeds(seeds: Iterable[Any]) -> None:
+def _check_seeds(seeds: Any) -> None:
+    if not isinstance(seeds, Iterable) or isinstance(seeds, (str, bytes, Mapping)):
+        raise ParameterError(f"seeds = {seeds!r:.60} is not allowed; it takes a list of numbers")
     for seed in seeds:
         if not (is_whole(seed) and 0 <= seed <= MAX_SEED):
             raise ParameterError(f"seed {seed!r} is not allowed; it takes a whole number from 0 to 2^64 - 1")

@@ -60,6 +60,8 @@ class Act:
             raise ParameterError(
                 f"Act({self.target!r}): give finite low and high that differ, or levels, or value"
             )
+        if self.levels is None and len(self.names) != 1:
+            raise ParameterError(f"Act({self.target!r}): only levels set several channels; give one target")
         if self.levels is not None and (
             len(self.levels) < 2
             or np.size(array_of(f"Act({self.target!r}): levels", self.levels))

@@ -13,9 +13,11 @@ import gymnasium
 import numpy as np
 
 from tussle.api import GroupView
+from tussle.api.channels import CHANNEL_UNITS
 from tussle.documents import read_bytes
 from tussle.errors import MissingExtraError, ParameterError, listed, nearest_name
 from tussle.folders import real_path
+from tussle.mission import Mission
 from tussle.numeric import rng
 from tussle.rl.action import Actor, Decoder, learned
 from tussle.rl.computed import Computed
@@ -282,6 +284,7 @@ class LearnedFlight:
                 f"Learned.block = {block!r}: {name} has no such block{nearest_name(block, blocks)}; {listed(blocks)}"
             )
         self.block = block or next(iter(blocks))
+        self._fits: tuple[Any, set[int]] = (None, set())
         acts = task.acts(self.block)
         for act in acts:
             if act.value is None and "." in act.target:
@@ -291,6 +294,12 @@ class LearnedFlight:
         played = learned(blocks[self.block], acts)
         actor = next(type(p) for p in played.autonomy if isinstance(p, Actor))
         self.channels, self._constants = tuple(actor.outputs()), actor.constants
+        for channel in self.channels:
+            if channel not in CHANNEL_UNITS:
+                raise ParameterError(
+                    f"Learned: {name} sets channel {channel!r}, which no vehicle that ships reads{nearest_name(channel, CHANNEL_UNITS)}; "
+                    f"give the input of the motion model or controller another name; {listed(CHANNEL_UNITS)}"
+                )
         self._decoder = Decoder(self.block, acts, np.float32)
         width, sizes = sum(task.widths[self.block]), self._decoder.sizes
         n_out = len(sizes) if self._decoder.is_continuous else int(sizes.sum())
@@ -307,14 +316,22 @@ class LearnedFlight:
                 f"Learned: {name} has {what} of several blocks; give each block its own task"
             )
 
-    def decide(self, g: GroupView, columns: Mapping[str, np.ndarray], memory: np.ndarray) -> None:
-        """Set the channels of the rows whose decision is due, by name, and what they keep, (numbers, n)."""
+    def decide(
+        self, g: GroupView, columns: Mapping[str, np.ndarray], memory: np.ndarray, rate: float | None
+    ) -> None:
+        """Set the channels of the rows whose decision is due, by name, and what they keep, (numbers, n), at a rate [Hz]."""
         simulation = g.context.simulation()
         interval = self.task.given.dt * self.task.decide_every
         every = round(interval / simulation.mission.dt)
         if abs(every * simulation.mission.dt - interval) > 1e-9 * interval:
             raise ParameterError(
                 f"Learned: the policy decides every {interval:g} s, which is no multiple of the mission's dt = {simulation.mission.dt:g} s"
+            )
+        calls = interval * rate if rate is not None else 1.0
+        if abs(calls - round(calls)) > 1e-9 or calls < 0.5:
+            raise ParameterError(
+                f"Learned: rate = {rate:g} Hz is not allowed; the policy decides every {interval:g} s, so it takes a multiple of "
+                f"{1.0 / interval:g} Hz, or None"
             )
         due = np.flatnonzero(g.step_count % every == 0)
         if not len(due):
@@ -355,6 +372,26 @@ class LearnedFlight:
             path = self.policies[which[lost[0]]].path
             g.fail(int(due[lost[0]]), f"the policy {path} keeps a value that is not a finite number")
 
+    def _check_fit(self, mission: Mission, number: int) -> None:
+        """Refuse a block of a mission in which agents observe more or less than in the task."""
+        if self._fits[0] is not mission:
+            self._fits = mission, set()
+        if number in self._fits[1]:
+            return
+        name, where = mission.blocks[number].name, f"Learned: observation of {type(self.task).__name__}"
+        try:
+            for component, n in zip(
+                self.task.components(self.block), self.task.widths[self.block], strict=True
+            ):
+                if (width := component.width(mission, name)) != n:
+                    raise ParameterError(
+                        f"{type(component).__name__} has {width} numbers in this mission, and {n} in that of the task: "
+                        "the blocks that it names have the same counts, and plugins the same columns"
+                    )
+        except ParameterError as error:
+            raise ParameterError(f"{where}: {error}") from None
+        self._fits[1].add(number)
+
     def observe(self, simulation: Any, g: GroupView) -> tuple[np.ndarray, np.ndarray]:
         """Observations of all rows, (n, numbers), and which levels they may choose, (n, levels): the task computes them, as in a swarm."""
         rows = g.first + np.arange(g.n)
@@ -365,6 +402,7 @@ class LearnedFlight:
         seen = np.zeros((g.n, width), self.task.dtype)
         allowed = np.ones((g.n, self.policies[0].n_out), bool)
         for number in np.unique(g.block):
+            self._check_fit(simulation.mission, int(number))
             mine = np.flatnonzero(g.block == number)
             place = g.block_index[mine]
             count = max(simulation.mission.blocks[number].count, int(place.max()) + 1)

@@ -32,6 +32,9 @@ class TaskParallelEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]  # Pett
         self.possible_agents = list(self.task.agent_names)
         self.agents: list[str] = []
         self._at: Any = []  # their numbers
+        self._joined = np.zeros(
+            len(self.possible_agents), np.int64
+        )  # decisions of the episode before that of each agent
         self._rows: Any = None  # of the body table, which change when agents die or are born
         self._number = {name: a for a, name in enumerate(self.possible_agents)}
         self.observation_spaces = {name: self.task.observation_space(a) for name, a in self._number.items()}
@@ -83,7 +86,7 @@ class TaskParallelEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]  # Pett
     ) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
         """Start a new episode; `options` may have "params", parameters by path. The infos have the seed and the parameters."""
         reset_one(self.swarm, seed, check_options(options))
-        self._actions[:] = 0
+        self._actions[:] = self._joined[:] = 0
         self.agents = self._living()
         self._at = self._numbers(self.agents)
         self._pictures.follow()
@@ -131,6 +134,7 @@ class TaskParallelEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]  # Pett
             reported = before + [name for name in self.agents if name not in known]
             self.agents = [name for name in self.agents if not is_dead[self._number[name]]]
             numbers, self._at = self._numbers(reported), self._numbers(self.agents)
+            self._joined[[self._number[name] for name in reported[len(before) :]]] = swarm.lengths[0]
             self._actions[~swarm.alive[0]] = 0  # of the dead, which `Situation.actions` would still show
         rewards, deaths, ends = (
             self._by_name(reported, values[0, numbers])
@@ -139,10 +143,9 @@ class TaskParallelEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]  # Pett
         infos: dict[str, dict[str, Any]] = {name: {} for name in reported}
         if len(self.agents) < len(reported):
             for name in set(reported).difference(self.agents):
-                infos[name]["episode"] = {
-                    "r": float(swarm.returns[0, self._number[name]]),
-                    "l": int(swarm.lengths[0]),
-                }
+                number = self._number[name]
+                length = int(swarm.lengths[0] - self._joined[number])
+                infos[name]["episode"] = {"r": float(swarm.returns[0, number]), "l": length}
         self._add_masks(infos)
         return self._observed(reported, numbers), rewards, deaths, ends, infos
 

@@ -129,9 +129,9 @@ class Task:
         for name, kind in kinds_of(Task).items():
             check_kind(f"{where}: {name}", getattr(self, name), kind)
         check_argument(f"{where}: decide_every", self.decide_every, Whole(1))
-        if self.time_limit is not None and not self.time_limit > 0.0:
+        if self.time_limit is not None and not 0.0 < self.time_limit < np.inf:
             raise ParameterError(
-                f"{where}: time_limit = {self.time_limit!r} is not allowed; it takes a number of seconds > 0"
+                f"{where}: time_limit = {self.time_limit!r} is not allowed; it takes a finite number of seconds > 0, or None"
             )
         if self.dtype is None or self.dtype not in (np.dtype(np.float32), np.dtype(np.float64)):
             raise ParameterError(f"{where}: dtype = {self.dtype!r} is not allowed; it is float32 or float64")
@@ -330,9 +330,14 @@ class Task:
         """Number of the block of each agent, (A,), in `blocks`."""
         return np.repeat(np.arange(len(self.blocks)), self.capacities)
 
+    def _block_of(self, agent: int) -> int:
+        """Number of the block of an agent in `blocks`."""
+        check_argument("agent", agent, Whole(0, len(self.agent_names) - 1))
+        return int(self.agent_block[agent])
+
     def observation_space(self, agent: int) -> spaces.Space[Any]:
-        """Observations of an agent, a Dict if its parts have names; bounds are infinite where they do not follow from the components."""
-        block = self.blocks[self.agent_block[agent]].name
+        """Observations of an agent by its number, a Dict if its parts have names; bounds are infinite where they are not known."""
+        block = self.blocks[self._block_of(agent)].name
         low, high = self._bounds[block]
         parts = self.parts[block]
         if not parts:
@@ -369,8 +374,8 @@ class Task:
         }
 
     def action_space(self, agent: int) -> spaces.Space[Any]:
-        """Actions of an agent; a space of its own, as each has a random generator."""
-        return copy.deepcopy(self.decoders[self.agent_block[agent]].space)
+        """Actions of an agent, by its number; a space of its own, as each has a random generator."""
+        return copy.deepcopy(self.decoders[self._block_of(agent)].space)
 
 
 def _attributes() -> list[str]:

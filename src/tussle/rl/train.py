@@ -164,6 +164,8 @@ class Trainer:
                 loss.backward()
                 check_finite("the gradient of the loss", nn.utils.clip_grad_norm_(model.parameters, 0.5))
                 role.optimizer.step()
+                sizes = [each.detach().abs().sum() for each in (*model.parameters, model.log_std.exp().log())]
+                check_finite("a weight", torch.stack(sizes))
 
     def train(self, minutes: float, tell: Callable[[dict[str, float]], bool]) -> None:
         """Train until `minutes` are over, those before a checkpoint included; at least one update. In a notebook, a bar shows the progress.

@@ -91,8 +91,8 @@ class Allowance:
         self._saved -= seconds
 
 
-def checked_warp(warp: Any) -> float:
-    """A warp as a number; None is as fast as possible.
+def checked_warp(warp: Any, name: str = "warp") -> float:
+    """A warp as a number; None is as fast as possible. `name` is that of the argument, for the error.
 
     Raises:
         ParameterError: It is not a number > 0.
@@ -101,7 +101,7 @@ def checked_warp(warp: Any) -> float:
         return math.inf
     if isinstance(warp, bool) or not isinstance(warp, (int, float)) or not warp > 0.0:
         raise ParameterError(
-            f"warp = {warp!r} is not allowed; it takes a number > 0, or None for as fast as possible"
+            f"{name} = {warp!r} is not allowed; it takes a number > 0, or None for as fast as possible"
         )
     return float(warp)
 

@@ -52,6 +52,20 @@ def test_robots_that_keep_to_the_mask_stay_in_the_room_and_enter_one_by_one():
     assert n_masked > 1000
 
 
+def test_the_length_of_an_agent_counts_its_own_decisions():
+    env = parallel_env(Dispersal(time_limit=8.0))
+    env.reset(seed=1)
+    taken, told = dict.fromkeys(env.possible_agents, 0), {}
+    while not env.swarm.over[0]:
+        for name in env.agents:
+            taken[name] += 1
+        mask = dict(zip(env.possible_agents, env.swarm.masks[0], strict=True))
+        infos = env.step({name: np.int64(mask[name].argmax()) for name in env.agents})[-1]
+        told |= {name: info["episode"]["l"] for name, info in infos.items() if "episode" in info}
+    assert told == {name: n for name, n in taken.items() if n}
+    assert len(set(told.values())) > 3
+
+
 def test_masks_states_and_births_are_those_of_a_world_alone_of_threads_and_of_a_restored_one():
     def played(n, threads):
         swarm, seen = make_swarm(Dispersal(time_limit=12.0), n, threads=threads), []

@@ -234,6 +234,12 @@ def test_numbers_that_are_not_finite_are_not_learned(values, what, trainer_of, t
     assert all(torch.isfinite(each).all() for each in trainer.model.parameters)
 
 
+@pytest.mark.parametrize("rate", [1e30, np.inf])
+def test_weights_that_are_not_finite_are_told_as_steps_that_are_too_large(rate, trainer_of):
+    with pytest.raises(ParameterError, match=r"^a weight is not a finite number.*lower learning_rate"):
+        trainer_of(Flee(), learning_rate=rate).train(1e-9, lambda line: False)
+
+
 def test_a_folder_that_cannot_be_written_is_told_before_the_training(trainer_of, tmp_path):
     (tmp_path / "out").write_text("")
     with pytest.raises(RecordError, match="out: cannot be written: File exists"):

@@ -4,6 +4,7 @@ import asyncio
 import base64
 import contextlib
 import json
+import re
 import socket
 import subprocess
 import sys
@@ -171,8 +172,10 @@ def test_states_are_kept_and_restored(server):
         ('{"do": "subscribe", "paths": ["flock.po"]}', "flock.po"),
         ('{"do": "subscribe", "paths": []}', "at least one path"),
         ('{"do": "unsubscribe", "subscription": 1}', "there is no subscription 1"),
-        ('{"do": "play", "pace": -1}', "warp = -1"),
+        ('{"do": "play", "pace": -1}', "pace = -1"),
+        ('{"do": "play", "warp": 1}', "play has no field 'warp'; there are: pace"),
         ('{"do": "reset", "worlds": [7]}', "worlds = [7]"),
+        (b'{"do": "step"}', "the message is binary"),
         ('{"do": "call", "command": "now", "fields": {}}', "do = 'call' is not allowed"),
         ("[" * 100000, "error"),
         ("nonsense", "the message is no JSON"),
@@ -181,12 +184,60 @@ def test_states_are_kept_and_restored(server):
 )  # fmt: skip
 def test_what_is_not_allowed_is_answered_and_changes_nothing(server, message, error):
     async def conversation(ask):
-        await ask.socket.send_str(message)
+        await (ask.socket.send_str if isinstance(message, str) else ask.socket.send_bytes)(message)
         answer = json.loads((await ask.socket.receive()).data)
         assert error in json.dumps(answer), answer
         assert (await ask("now"))["step"] == [0, 0]
 
     talk(server, conversation)
+
+
+FIELDS = {
+    "step": ["n"], "play": ["pace"], "read": ["path", "encoding"], "write": ["path", "values"], "restore": ["snapshot"],
+    "publish": ["message", "fields", "worlds", "network", "topic"], "subscribe": ["paths", "every", "encoding"],
+    "unsubscribe": ["subscription"], "reset": ["worlds", "seeds"], "state_hash": ["world"],
+}  # fmt: skip
+SOUND = {
+    "path": "flock.pos", "values": 1.0, "message": "SpawnEntity", "fields": {"block": "spare"}, "paths": ["flock.pos"], "snapshot": 1,
+    "subscription": 1,
+}  # fmt: skip
+WRONG = [True, 0, -1, 5, 1.5, 1e300, "", "x", [], ["x"], [None], [[1, [2]]], {}, {"a": 1}, {"id": "x"}]
+
+
+@pytest.mark.parametrize(("command", "field"), [(c, f) for c, fields in FIELDS.items() for f in fields])
+def test_errors_of_values_of_any_type_are_in_the_words_of_the_client(server, command, field):
+    async def conversation(ask):
+        for wrong in WRONG:
+            answer = await ask(
+                command, **{**{k: v for k, v in SOUND.items() if k in FIELDS[command]}, field: wrong}
+            )
+            assert not re.search(
+                r"Error|object is|object cannot|argument|NoneType", answer.get("error", "")
+            ), (
+                wrong,
+                answer,
+            )
+            await ask("pause")
+
+    talk(server, conversation)
+
+
+def test_the_step_of_a_client_that_is_gone_ends():
+    with Simulation(mission(end=1e7), seeds=[1]) as simulation, Server(simulation) as server:
+
+        async def leave(ask):
+            await ask.socket.send_json({"do": "step", "n": 10**9})
+            while not simulation.steps[0]:
+                await asyncio.sleep(0.01)
+            ask.socket._response.connection.transport.abort()
+
+        async def stay(ask):
+            for _ in range(1000):
+                await asyncio.sleep(0.02 * bool(server._clients[1:]))
+            assert (await ask("now"))["step"] == (await ask("now"))["step"]
+
+        talk(server, leave)
+        talk(server, stay)
 
 
 def test_only_who_knows_the_address_is_served_and_no_page(server):

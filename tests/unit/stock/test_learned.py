@@ -17,13 +17,32 @@ pytest.importorskip("gymnasium", reason="gymnasium is not installed: pip install
 import onnx
 from onnx import TensorProto, helper, numpy_helper
 
-from tussle import Simulation
+from tussle import Block, Mission, Simulation
+from tussle.api import Input, MotionModel, State
 from tussle.errors import MissingExtraError, ParameterError, PluginError
 from tussle.mission import read_mission
 from tussle.plugins import stock
-from tussle.rl import Dispersal, NearOrigin, PredatorTeam, PreyEscape, make_swarm, register, write_policy
+from tussle.rl import (
+    Act,
+    Dispersal,
+    Each,
+    Means,
+    NearestOthers,
+    NearOrigin,
+    Own,
+    PredatorTeam,
+    PreyEscape,
+    Sectors,
+    Task,
+    Term,
+    alive,
+    make_swarm,
+    register,
+    write_policy,
+)
 from tussle.rl.flight import BATCH, Policy
-from tussle.stock import Learned
+from tussle.rl.observation import Component, _Others, _Search
+from tussle.stock import Learned, NoisyState, SingleIntegrator, Still
 
 WIDTH = 3 + 3 * 8 + 5
 
@@ -129,6 +148,116 @@ def test_a_mask_that_cannot_be_kept_to_is_told(name, asks, message, tmp_path, ma
     _, mission = dispersal(tmp_path, f"masked/{name}-v0")
     with Simulation(mission, seeds=[1]) as simulation, pytest.raises(PluginError, match=message):
         simulation.run()
+
+
+class Buoys(Task):
+    """Two robots and three buoys."""
+
+    mission = Mission(
+        blocks=[
+            Block(name="buoy", team=2, count=3, position=(9, 0, 0), variance=(9, 9, 0), motion=Still()),
+            Block(
+                name="robot",
+                team=1,
+                count=2,
+                variance=(9, 9, 0),
+                motion=SingleIntegrator(),
+                sensor=NoisyState(),
+            ),
+        ],
+        end=2.0,
+    )
+    learners = "robot"
+    observation = Own("pos")
+    action = (Act("velocity_x", -1.0, 1.0),)
+    reward = {"alive": Term(alive)}  # noqa: RUF012 - declared as ClassVar in Task
+    decide_every = 3
+
+
+NAMED = {
+    "Each": Each("buoy"), "NearestOthers": NearestOthers(2, of="buoy"), "Sectors": Sectors(4, 9.0, of="buoy"),
+    "Means": Means(9.0, of="buoy"), "Own": Own("NoisyState.belief_pos"),
+}  # fmt: skip
+"""Components that name blocks or plugins."""
+
+
+@pytest.fixture
+def flown(tmp_path):
+    """Register a task, and return the blocks of buoys and robots, which a policy of the task flies."""
+
+    def of(task, **values):
+        register("mine/Buoys-v0", task)
+        path = team_policy(tmp_path / "buoys.onnx", sum(task.widths["robot"]), 1, "mine/Buoys-v0")
+        buoy, robot = Buoys.mission.blocks
+        return buoy, robot.replace(autonomy=Learned(policy=path, **values))
+
+    yield of
+    gymnasium.registry.pop("mine/Buoys-v0", None)
+
+
+@pytest.mark.parametrize("name", NAMED)
+def test_a_policy_observes_in_a_mission_as_many_numbers_as_in_its_task(name, flown):
+    named = {c.__name__ for c in (Component, *_Others.__subclasses__(), *_Search.__subclasses__())}
+    assert named - {"Component", "_Search"} | {"Own"} == set(NAMED)
+    buoy, robot = flown(Buoys(observation=(NAMED[name], Own("pos"))))
+    others = [[buoy.replace(count=n), robot] for n in (1, 2, 4, 99)] if name == "Each" else []
+    bare = (
+        [[buoy, robot.replace(sensor=())]]
+        if name == "Own"
+        else [[robot], [buoy.replace(name="other"), robot]]
+    )
+    for blocks in (*others, *bare):
+        with (
+            Simulation(Buoys.mission.replace(blocks=blocks), seeds=[1, 2]) as simulation,
+            pytest.raises(PluginError, match=f"observation of Buoys: {name}"),
+        ):
+            simulation.run()
+    with Simulation(Buoys.mission.replace(blocks=[robot, buoy]), seeds=[1, 2]) as simulation:
+        simulation.run()
+
+
+@pytest.mark.parametrize("rate", [1.0, 2.5, 5.0, 20 / 3, 10 / 3, 10.0])
+def test_a_policy_with_a_rate_decides_as_often_as_its_task_or_is_refused(rate, flown):
+    buoy, robot = flown(Buoys(), rate=rate)
+    path = robot.autonomy[0].values["policy"]
+
+    def run(autonomy):
+        blocks = [buoy, robot.replace(autonomy=autonomy)]
+        with Simulation(Buoys.mission.replace(blocks=blocks), seeds=[1]) as simulation:
+            simulation.run()
+            return simulation.read("robot.pos")[0].tolist()
+
+    if rate in (10 / 3, 20 / 3, 10.0):
+        assert run(robot.autonomy) == run(Learned(policy=path))
+    else:
+        with pytest.raises(PluginError, match=r"decides every 0\.3 s, so it takes a multiple of 3\.33"):
+            run(robot.autonomy)
+
+
+class Pushed(MotionModel):
+    """A cart with an input of its own."""
+
+    x = State("east speed", unit="m m/s")
+    shove = Input(unit="m/s^2")
+
+    @staticmethod
+    def derivative(speed, shove):
+        return speed, shove
+
+    def from_body(self, body, rows):
+        self.x[:, rows] = np.stack([body.pos[0], body.vel[0]])[:, rows]
+
+    def to_body(self, body):
+        body.pos[0], body.vel[0] = self.x
+
+
+def test_a_channel_of_ones_own_is_told(flown):
+    buoy, robot = (b.replace(motion=Pushed()) if b.name == "robot" else b for b in Buoys.mission.blocks)
+    task = Buoys(mission=Buoys.mission.replace(blocks=[buoy, robot]), action=Act("shove", -1.0, 1.0))
+    _, learned = flown(task)
+    mission = Buoys.mission.replace(blocks=[buoy, robot.replace(autonomy=learned.autonomy)])
+    with pytest.raises(ParameterError, match="sets channel 'shove', which no vehicle that ships reads"):
+        Simulation(mission)
 
 
 def test_worlds_are_the_same_in_any_stack(tmp_path):

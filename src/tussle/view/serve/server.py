@@ -149,10 +149,13 @@ class Server:
         client = Client(socket)
         self._clients.append(client)
         sender = asyncio.create_task(self._send(client))
+
+        def is_gone() -> bool:
+            return request.transport is None or request.transport.is_closing()
+
         try:
             async for message in socket:
-                if isinstance(message.data, str):
-                    await client.waiting.put(as_json(await self._answer(client, message.data)))
+                await client.waiting.put(as_json(await self._answer(client, message.data, is_gone)))
         finally:
             self._clients.remove(client)
             sender.cancel()
@@ -167,16 +170,18 @@ class Server:
 
     # -- commands -------------------------------------------------------------------------------------------------------------------
 
-    async def _answer(self, client: Client, text: str) -> dict[str, Any]:
+    async def _answer(self, client: Client, text: Any, is_gone: Callable[[], bool]) -> dict[str, Any]:
         """Execute a command and return its answer."""
         answer: dict[str, Any] = {}
         try:
+            if not isinstance(text, str):
+                raise ParameterError("the message is binary; a message is a text with an object of JSON")
             fields = json.loads(text)
             if not isinstance(fields, dict):
                 raise ParameterError('a message is an object, such as {"do": "step", "n": 10, "id": 1}')
             if "id" in fields:
                 answer["id"] = fields.pop("id")
-            answer |= await self._do(client, fields.pop("do", None), fields)
+            answer |= await self._do(client, fields.pop("do", None), fields, is_gone)
         except TussleError as error:
             answer["error"] = str(error)
         except (ValueError, RecursionError) as error:
@@ -185,13 +190,13 @@ class Server:
             answer["error"] = f"{type(error).__name__}: {error}"
         return answer
 
-    async def _do(self, client: Client, command: Any, fields: dict[str, Any]) -> dict[str, Any]:
+    async def _do(
+        self, client: Client, command: Any, fields: dict[str, Any], is_gone: Callable[[], bool]
+    ) -> dict[str, Any]:
         if command == "step":
-            return await self._step(**_known(command, fields, n=1))
+            return await self._step(is_gone, **_known(command, fields, n=1))
         if command == "play":
-            self._pace = Pace(
-                checked_warp(**_known(command, {"warp": fields.pop("pace", 1.0)} | fields, warp=1.0))
-            )
+            self._pace = Pace(checked_warp(_known(command, fields, pace=1.0)["pace"], "pace"))
             self._can_play.set()
             return {}
         if command == "pause":
@@ -222,7 +227,7 @@ class Server:
             return await asyncio.get_running_loop().run_in_executor(self._executor, function)
 
     def _subscribe(self, client: Client, paths: Any, every: int, encoding: str) -> dict[str, Any]:
-        wanted = (paths,) if isinstance(paths, str) else tuple(paths)
+        wanted = tuple(paths) if isinstance(paths, list) else (paths,)
         if not wanted or len(client.subscriptions) >= MAX_SUBSCRIPTIONS:
             raise ParameterError(
                 f"a client has 1 to {MAX_SUBSCRIPTIONS} subscriptions, each of at least one path"
@@ -238,9 +243,11 @@ class Server:
 
     # -- steps ------------------------------------------------------------------------------------------------------------------------
 
-    async def _step(self, n: int) -> dict[str, Any]:
+    async def _step(self, is_gone: Callable[[], bool], n: int) -> dict[str, Any]:
         check_argument("n", n, COUNT)
-        while n > 0 and not self._simulation.is_over:
+        while n > 0 and not (
+            self._simulation.is_over or is_gone()
+        ):  # who is gone does not step the game of others
             n -= await self._turned(partial(self._advance, n))
         return self._session.now()
 

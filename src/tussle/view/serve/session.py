@@ -155,13 +155,21 @@ class Session:
     def write(self, path: str, values: Any) -> dict[str, Any]:
         """Set a column, with values shaped as from `read`; as `Simulation.write`."""
         array = np.array(values)
-        self._simulation.write(path, array.astype(float) if array.dtype == object else array)
+        try:
+            array = array.astype(float) if array.dtype == object else array
+        except TypeError:
+            raise ParameterError("values are no numbers, nor lists of numbers or null") from None
+        self._simulation.write(path, array)
         return {}
 
     def publish(
-        self, message: str, fields: dict[str, Any], worlds: list[int] | None = None, network: str = "", topic: str = ""
+        self, message: str, fields: Any, worlds: list[int] | None = None, network: Any = "", topic: Any = ""
     ) -> dict[str, Any]:  # fmt: skip
         """Publish a message to the plugins, such as SpawnEntity or RemoveEntity; as `Simulation.publish`."""
+        if not (isinstance(fields, dict) and isinstance(network, str) and isinstance(topic, str)):
+            raise ParameterError(
+                "publish: fields is an object with values by name; network and topic are texts"
+            )
         kinds = {kind.__name__: kind for kind in messages.Message.__subclasses__()}
         if message not in kinds:
             raise ParameterError(

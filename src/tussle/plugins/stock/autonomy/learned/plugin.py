@@ -74,4 +74,4 @@ class Learned(Autonomy):
 
     def step(self, g: GroupView) -> None:
         flight = self._flight()
-        flight.decide(g, {name: getattr(self, name) for name in flight.channels}, self.memory)
+        flight.decide(g, {name: getattr(self, name) for name in flight.channels}, self.memory, self.rate)
