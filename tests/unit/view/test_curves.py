@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 from guarded_gate import guarded_gate
-from page_client import PageClient
+from page_client import PageClient, browsed
 from recorded_games import hunt, record
 from watched_plugins import clickable
 
@@ -22,7 +22,6 @@ from tussle.view.entity import entity_state
 from tussle.view.page.compare import Comparison
 from tussle.view.page.recorded import RecordedData
 from tussle.view.page.recorded_curves import COLUMNS, column_changes
-from tussle.view.page.server import Page
 from tussle.view.page.settings import differing_settings
 from tussle.view.series import CurveName, StepSeries
 
@@ -189,12 +188,7 @@ class Slow(Metric):
 
 
 def test_what_is_no_finite_number_is_null_on_the_page():
-    with (
-        Simulation(clickable(metrics=[Odd()]), 1) as simulation,
-        Live(simulation, is_paused=True) as live,
-        Page(live) as page,
-        PageClient(page.url) as client,
-    ):
+    with browsed(clickable(metrics=[Odd()]), 1, is_paused=True) as (live, _, client):
         live.step(5)
         client.order("want", wanted=[["Odd.late", 0]])
         client.wait(
@@ -232,12 +226,7 @@ def test_a_series_has_changes_only():
 
 
 def test_a_browser_gets_each_change_once_and_all_when_it_comes_late():
-    with (
-        Simulation(guarded_gate(), 5) as simulation,
-        Live(simulation, is_paused=True, pace=None) as live,
-        Page(live) as page,
-        PageClient(page.url) as client,
-    ):
+    with browsed(guarded_gate(), 5, is_paused=True, pace=None) as (live, page, client):
         live.step(100)
         client.order("want", wanted=[["Share.gone", 0], ["x", 2], ["Gate.passed", 0]])
         client.wait(lambda: ("x", None, 2) in client.curves)
