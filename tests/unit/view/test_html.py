@@ -199,7 +199,7 @@ def flocks(n, end):
 
 
 def test_the_page_is_small(tmp_path):
-    n, end, most = 110, 500.0, 15e6
+    n, end, most = 110, 250.0, 7.5e6
     recording = Recording(record(flocks(n, end), tmp_path / "run"))
     export = write_html(recording, tmp_path / "page.html")
     assert export.n_states == n * (10 * end + 1)
