@@ -40,6 +40,16 @@ def steps_of(mission, seed=5):
             alone.step()
 
 
+def named_results(result):
+    """Scores and results of plugins, by name and team."""
+    found = {("score", team): n for team, n in result.scores.items()}
+    for plugin, named in result.metrics.items():
+        for name, value in named.items():
+            by_team = value if isinstance(value, dict) else {None: value}
+            found |= {(f"{plugin}.{name}", team): v for team, v in by_team.items()}
+    return found
+
+
 def check_world(live, mission, seed=5, last=math.inf):
     """Compare every quantity of the world with the results of the game alone, in each step."""
     series = live.curves.series
@@ -48,11 +58,7 @@ def check_world(live, mission, seed=5, last=math.inf):
             return
         expected = {CurveName("left", team): n for team, n in result.alive.items()}
         expected |= {CurveName("born", team): n for team, n in result.born.items()}
-        expected |= {CurveName("score", team): n for team, n in result.scores.items()}
-        for plugin, named in result.metrics.items():
-            for name, value in named.items():
-                by_team = value if isinstance(value, dict) else {None: value}
-                expected |= {CurveName(f"{plugin}.{name}", team): v for team, v in by_team.items()}
+        expected |= {CurveName(*name): v for name, v in named_results(result).items()}
         assert {quantity: each.at(step) for quantity, each in series.items() if not quantity.id} == expected
 
 
@@ -314,12 +320,9 @@ def test_recorded_results_are_those_after_each_step_of_every_world(tmp_path):
     for world, seed in enumerate(seeds):
         found = Recording(tmp_path / "run", world).results
         for step, result in steps_of(mission, seed):
-            expected = {("score", team): n for team, n in result.scores.items()}
-            for plugin, named in result.metrics.items():
-                for name, value in named.items():
-                    by_team = value if isinstance(value, dict) else {None: value}
-                    expected |= {(f"{plugin}.{name}", team): v for team, v in by_team.items()}
-            assert {key: value_at(curve, result.t) for key, curve in found.items()} == expected, step
+            assert {key: value_at(curve, result.t) for key, curve in found.items()} == named_results(
+                result
+            ), step
         assert len(found["Gate.passed", None][0]) == 1 + result.metrics["Gate"]["passed"]
     shown = changes_in(RecordedData(Recording(tmp_path / "run"), is_file=True))
     assert {
