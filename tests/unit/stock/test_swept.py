@@ -59,7 +59,7 @@ def least_distances(pos, vel, dt=0.1):
 
 
 def least_from(k, pos, vel, dt=0.1):
-    """Least distance of one from each within a step, (n,)."""
+    """Least distance of one from each within a step, (n,); 0 from itself."""
     t = np.linspace(0.0, dt, FINE)
     apart = [x[:, None] - x[k] + (v[:, None] - v[k]) * t for x, v in zip(pos.T, vel.T, strict=True)]
     return np.sqrt(sum(a * a for a in apart).min(axis=1))
