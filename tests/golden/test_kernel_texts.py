@@ -5,7 +5,10 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
 
+
+@pytest.mark.slow
 def test_generated_texts_are_those_that_are_kept():
     script = Path(__file__).with_name("kernel_texts.py")
     # In a process of its own: a text is generated once per process, some while modules are imported.

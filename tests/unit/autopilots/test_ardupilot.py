@@ -112,13 +112,14 @@ def test_it_arms_at_rest_takes_off_and_lands(dt, roll):
     port, pilot = free_ports(), StrictPilot()
     ground = GroundCollision(enable_startup_collisions=False, remove_on_collision=False)
     block = {"position": (3.0, -4.0, 0.0), "variance": (0, 0, 0), "roll": roll}
-    lowest = 0.0
+    lowest = at_rest = 0.0
     with (
         JsonServant(port, act=pilot),
         Simulation(copter(port, block=block, dt=dt, end=20.0).replace(interactions=[ground])) as sim,
     ):
-        while not sim.is_over:
+        while not sim.is_over and at_rest < 1.0:
             sim.step()
+            at_rest += dt * (pilot.phase == "disarmed")
             lowest = min(lowest, sim.read("copter.pos")[0][0, 0, 2])
     assert pilot.phase == "disarmed"
     assert pilot.highest > 2.0

@@ -48,7 +48,7 @@ def test_where_a_batch_stops_does_not_depend_on_who_plays_nor_on_interruptions(m
     assert rows(until_batch(mission).play(executor=InProcess(64), until=rule)) == rows(reference)
 
     def watch(progress):
-        if progress.n_done - progress.n_before >= 23:
+        if progress.n_done - progress.n_before >= 71:
             raise Enough
 
     path = tmp_path / "out"

@@ -552,5 +552,3 @@ def test_a_referee_due_in_some_worlds_asks_only_there():
 def test_negative_count_is_refused():
     with pytest.raises(MissionError, match=r"block 'a': count = -1 is not allowed"):
         block(count=-1)
-    with pytest.raises(ParameterError, match=r"seed '1' is not allowed"):
-        Simulation(mission(), seeds=["1"])

@@ -533,15 +533,10 @@ def test_simulations_that_cannot_be():
         Simulation(None)
     with pytest.raises(MissionError, match="seeds is empty"):
         Simulation(mission(), seeds=[])
-    for seed in ("x", 1.5, True):
-        with pytest.raises(ParameterError, match=f"seed {seed!r} is not allowed; it takes a whole number"):
-            Simulation(mission(), seeds=[seed])
     with pytest.raises(ParameterError, match=r"seed 1.5 is not allowed"):
         Simulation(mission(), seeds=1.5)
     with pytest.raises(ParameterError, match="on_error = 'ignore' is not allowed; it is 'raise' or 'record'"):
         Simulation(mission(), on_error="ignore")
-    with pytest.raises(ParameterError, match="threads = 0 is not allowed; it takes a whole number >= 1"):
-        Simulation(mission(), threads=0)
 
 
 def test_names_that_the_api_does_not_have():

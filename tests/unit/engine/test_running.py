@@ -89,30 +89,12 @@ def test_a_mission_of_one_team_is_no_last_team_standing():
     assert Simulation(mission(block(), end_conditions="time, one_team")).run()[0].end == "time"
 
 
-def test_the_game_is_open_while_births_are_to_come():
-    """Team 1 is gone at 0.2 s, but another of it comes at 0.5 s; all of team 2 stay."""
-    late = block("late", team=1, count=1, rate=1.0, first_birth=0.5)
-    game = mission(
-        block("one", team=1),
-        block("two", team=2),
-        late,
-        end_conditions="time, one_team",
-        interactions=[Reaper(team=1, at=0.2)],
-    )
-    result = Simulation(game).run()[0]
-    assert (result.end, result.steps) == ("one_team", 6)
-
-
-def test_the_game_ends_when_the_last_birth_changes_nothing():
-    """Team 1 is gone at 0.2 s; the last birth, of team 2, decides that it has lost: nobody dies in that step."""
-    late = block("late", team=2, count=1, rate=1.0, first_birth=0.5)
-    game = mission(
-        block("one", team=1),
-        block("two", team=2),
-        late,
-        end_conditions="time, one_team",
-        interactions=[Reaper(team=1, at=0.2)],
-    )
+@pytest.mark.parametrize("team", [1, 2])
+def test_the_game_is_open_while_births_are_to_come_and_ends_when_the_last_one_changes_nothing(team):
+    """Team 1 is gone at 0.2 s, and one is born at 0.5 s: of it, or of team 2, so that nobody dies in the step that decides."""
+    late = block("late", team=team, count=1, rate=1.0, first_birth=0.5)
+    blocks = block("one", team=1), block("two", team=2), late
+    game = mission(*blocks, end_conditions="time, one_team", interactions=[Reaper(team=1, at=0.2)])
     result = Simulation(game).run()[0]
     assert (result.end, result.steps) == ("one_team", 6)
 
@@ -278,11 +260,8 @@ def test_reset_gives_seeds_and_params_in_the_order_of_the_worlds():
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (([3],), r"reset: worlds = \[3\] .*0 to 1, each once"),
-        (([-1],), r"reset: worlds = \[-1\] .*0 to 1"),
         (([0, 0],), r"reset: worlds = \[0, 0\] .*0 to 1, each once"),
         (([0, 1], [5]), r"reset: 1 seeds for 2 worlds"),
-        (([0], ["x"]), r"seed 'x' is not allowed; it takes a whole number"),
         (([0], None, {"a.Drift.two": 1}), r"Drift has no 'two' \(did you mean 'to'\?\)"),
     ],
 )

@@ -49,7 +49,9 @@ SURFACES = '<autonomy speed="50">Straight</autonomy><controller>AircraftPIDContr
     [
         (hawk(), HELD, JSBSimModel),
         ('aircraft="c172p">JSBSimControl', SURFACES, JSBSimControl),
-        ('aircraft="J3Cub" name="cub">JSBSimControl', SURFACES, JSBSimControl),
+        pytest.param(
+            'aircraft="J3Cub" name="cub">JSBSimControl', SURFACES, JSBSimControl, marks=pytest.mark.slow
+        ),
     ],
 )
 def test_an_aircraft_flies_compiled_under_its_own_name_as_in_jsbsim(read, motion, flown, library):

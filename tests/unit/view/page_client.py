@@ -7,10 +7,15 @@ import json
 import struct
 import threading
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from importlib import import_module
 
 import numpy as np
 from page_reader import read_chunk
+
+from tussle import Mission, Simulation
+from tussle.view import Live
 
 
 class PageClient:
@@ -148,3 +153,15 @@ class PageClient:
 
     def __exit__(self, *_) -> None:
         self.close()
+
+
+@contextmanager
+def browsed(mission: Mission, seed: int, **options: object) -> Iterator[tuple[Live, object, PageClient]]:
+    """A game with options of `Live`, its page, and a browser at it."""
+    from tussle.view.page.server import Page
+
+    with (
+        Simulation(mission, seed) as simulation, Live(simulation, **options) as live,
+        Page(live) as page, PageClient(page.url) as client,
+    ):  # fmt: skip
+        yield live, page, client

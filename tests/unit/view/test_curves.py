@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 from guarded_gate import guarded_gate
-from page_client import PageClient
+from page_client import PageClient, browsed
 from recorded_games import hunt, record
 from watched_plugins import clickable
 
@@ -22,7 +22,6 @@ from tussle.view.entity import entity_state
 from tussle.view.page.compare import Comparison
 from tussle.view.page.recorded import RecordedData
 from tussle.view.page.recorded_curves import COLUMNS, column_changes
-from tussle.view.page.server import Page
 from tussle.view.page.settings import differing_settings
 from tussle.view.series import CurveName, StepSeries
 
@@ -41,6 +40,16 @@ def steps_of(mission, seed=5):
             alone.step()
 
 
+def named_results(result):
+    """Scores and results of plugins, by name and team."""
+    found = {("score", team): n for team, n in result.scores.items()}
+    for plugin, named in result.metrics.items():
+        for name, value in named.items():
+            by_team = value if isinstance(value, dict) else {None: value}
+            found |= {(f"{plugin}.{name}", team): v for team, v in by_team.items()}
+    return found
+
+
 def check_world(live, mission, seed=5, last=math.inf):
     """Compare every quantity of the world with the results of the game alone, in each step."""
     series = live.curves.series
@@ -49,11 +58,7 @@ def check_world(live, mission, seed=5, last=math.inf):
             return
         expected = {CurveName("left", team): n for team, n in result.alive.items()}
         expected |= {CurveName("born", team): n for team, n in result.born.items()}
-        expected |= {CurveName("score", team): n for team, n in result.scores.items()}
-        for plugin, named in result.metrics.items():
-            for name, value in named.items():
-                by_team = value if isinstance(value, dict) else {None: value}
-                expected |= {CurveName(f"{plugin}.{name}", team): v for team, v in by_team.items()}
+        expected |= {CurveName(*name): v for name, v in named_results(result).items()}
         assert {quantity: each.at(step) for quantity, each in series.items() if not quantity.id} == expected
 
 
@@ -189,12 +194,7 @@ class Slow(Metric):
 
 
 def test_what_is_no_finite_number_is_null_on_the_page():
-    with (
-        Simulation(clickable(metrics=[Odd()]), 1) as simulation,
-        Live(simulation, is_paused=True) as live,
-        Page(live) as page,
-        PageClient(page.url) as client,
-    ):
+    with browsed(clickable(metrics=[Odd()]), 1, is_paused=True) as (live, _, client):
         live.step(5)
         client.order("want", wanted=[["Odd.late", 0]])
         client.wait(
@@ -232,12 +232,7 @@ def test_a_series_has_changes_only():
 
 
 def test_a_browser_gets_each_change_once_and_all_when_it_comes_late():
-    with (
-        Simulation(guarded_gate(), 5) as simulation,
-        Live(simulation, is_paused=True, pace=None) as live,
-        Page(live) as page,
-        PageClient(page.url) as client,
-    ):
+    with browsed(guarded_gate(), 5, is_paused=True, pace=None) as (live, page, client):
         live.step(100)
         client.order("want", wanted=[["Share.gone", 0], ["x", 2], ["Gate.passed", 0]])
         client.wait(lambda: ("x", None, 2) in client.curves)
@@ -325,12 +320,9 @@ def test_recorded_results_are_those_after_each_step_of_every_world(tmp_path):
     for world, seed in enumerate(seeds):
         found = Recording(tmp_path / "run", world).results
         for step, result in steps_of(mission, seed):
-            expected = {("score", team): n for team, n in result.scores.items()}
-            for plugin, named in result.metrics.items():
-                for name, value in named.items():
-                    by_team = value if isinstance(value, dict) else {None: value}
-                    expected |= {(f"{plugin}.{name}", team): v for team, v in by_team.items()}
-            assert {key: value_at(curve, result.t) for key, curve in found.items()} == expected, step
+            assert {key: value_at(curve, result.t) for key, curve in found.items()} == named_results(
+                result
+            ), step
         assert len(found["Gate.passed", None][0]) == 1 + result.metrics["Gate"]["passed"]
     shown = changes_in(RecordedData(Recording(tmp_path / "run"), is_file=True))
     assert {

@@ -473,25 +473,6 @@ def test_what_lies_outside_the_run_is_said_or_refused(flown, tmp_path):
     assert [p.name for p in tmp_path.iterdir()] == ["a.mp4"]
 
 
-def test_a_run_without_states_cannot_be_filmed(tmp_path):
-    (tmp_path / "run").mkdir()
-    (tmp_path / "run" / "trajectory.arrow").write_bytes(b"")
-    with pytest.raises(ViewError, match="the run holds no states, so there is nothing to film"):
-        write_film(Recording(tmp_path / "run"), mp4=tmp_path / "a.mp4")
-
-
-@pytest.mark.parametrize("kind", ["mp4", "gif", "png"])
-def test_a_file_that_cannot_be_written_is_told_and_leaves_nothing(flown, tmp_path, kind):
-    options = FilmOptions(stop=0.4, speed=1.0, fps=5.0, **BARE)
-    with pytest.raises(ViewError, match=r"nowhere/a\.\w+: cannot be written: No such file or directory"):
-        write_film(flown, **{kind: tmp_path / "nowhere" / f"a.{kind}"}, options=options)
-    (tmp_path / "folder").mkdir()
-    with pytest.raises(ViewError, match="folder: cannot be written: it is a directory"):
-        write_film(flown, **{kind: tmp_path / "folder"}, options=options)
-    assert [p.name for p in tmp_path.iterdir()] == ["folder"]
-    assert not list((tmp_path / "folder").iterdir())
-
-
 @pytest.mark.needs("renderer")
 @pytest.mark.filterwarnings(
     "ignore::ResourceWarning"

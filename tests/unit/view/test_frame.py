@@ -69,12 +69,3 @@ def test_a_lens_sees_who_has_come_and_gone_and_the_end_of_a_world():
     assert len(counts) > 3
     assert sim.steps[0] != sim.steps[1]
     assert [reader.frame().step for reader in readers] == sim.steps.tolist()
-
-
-def test_row_of_an_id():
-    sim = Simulation(hunt())
-    sim.run()
-    frame = frame_of(sim)
-    assert 1 < len(frame) < frame.id[-1]  # some are gone
-    for who in range(frame.id[-1] + 3):
-        assert frame.row_of(who) == (frame.id.tolist().index(who) if who in frame.id else -1)

@@ -252,14 +252,6 @@ def test_errors_leave_no_file(hunted, tmp_path):
         write_geographic(
             hunted, tmp_path / "out", "kml", epoch=datetime(9999, 12, 31, 23, 59, 59, tzinfo=UTC)
         )
-    with pytest.raises(ViewError, match="cannot be written"):
-        write_geographic(hunted, tmp_path / "none" / "out", "kml")
-
-    def stop(done, of):
-        raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        write_geographic(hunted, tmp_path / "out", "czml", show=stop)
     assert list(tmp_path.iterdir()) == []
 
 

@@ -1,9 +1,10 @@
 """Orders that come over a slow link that loses some."""
 
 import time
+from contextlib import contextmanager
 
 import pytest
-from page_client import PageClient
+from page_client import PageClient, browsed
 
 from tussle import Block, Mission, Recorder, Simulation
 from tussle.api import Autonomy, Field, Handle, Message, Output, State, Subscribe
@@ -52,17 +53,24 @@ def mission():
     return Mission(name="linked", blocks=[block], dt=DT, end=1e3, end_conditions="time")
 
 
-def ordered(link, sends, n_steps=60, seed=1):
-    """Steps at which orders came, and the hash at the end. `sends` maps steps to speeds, sent to robot 2."""
+@contextmanager
+def linked(link, seed=1):
+    """The game, whose orders come over a link."""
     with (
         Simulation(mission(), seed) as simulation,
         Live(simulation, threaded=False, is_paused=True, link=link) as live,
     ):
+        yield live
+
+
+def ordered(link, sends, n_steps=60, seed=1):
+    """Steps at which orders came, and the hash at the end. `sends` maps steps to speeds, sent to robot 2."""
+    with linked(link, seed) as live:
         for step in range(n_steps):
             for speed in sends.get(step, ()):
                 live.publish(Go, receivers=[2], speed=speed, note="go")
             live.step(1)
-        return [each.step for each in live.injections], simulation.state_hash()
+        return [each.step for each in live.injections], live.simulation.state_hash()
 
 
 @pytest.mark.parametrize(("delay", "later"), [(0.0, 0), (0.04, 1), (0.1, 1), (0.75, 8), (2.0, 20)])
@@ -121,11 +129,7 @@ def test_what_came_over_the_link_is_played_again_without_it(tmp_path):
 
 
 def test_a_jump_in_time_and_a_restart_lose_what_is_on_the_way():
-    link = OperatorLink(delay=1.0)
-    with (
-        Simulation(mission(), 1) as simulation,
-        Live(simulation, threaded=False, is_paused=True, link=link) as live,
-    ):
+    with linked(OperatorLink(delay=1.0)) as live:
         assert live.notes == ["orders take 1 s (--link)"]
         live.step(20)
         live.publish(Go, speed=1.0)
@@ -141,11 +145,7 @@ def test_a_jump_in_time_and_a_restart_lose_what_is_on_the_way():
 
 
 def test_an_order_that_cannot_be_carried_out_when_it_comes_is_a_note():
-    link = OperatorLink(delay=0.5)
-    with (
-        Simulation(mission(), 1) as simulation,
-        Live(simulation, threaded=False, is_paused=True, link=link) as live,
-    ):
+    with linked(OperatorLink(delay=0.5)) as live:
         live.remove([2])
         live.step(2)
         live.set_parameter([2], "SingleIntegrator.max_speed", 5.0)
@@ -157,10 +157,7 @@ def test_an_order_that_cannot_be_carried_out_when_it_comes_is_a_note():
 
 @pytest.mark.parametrize("link", [None, OperatorLink(delay=0.2, bandwidth=1e3)])
 def test_objects_that_cannot_be_written_down_are_sent_as_others(link):
-    with (
-        Simulation(mission(), 1) as simulation,
-        Live(simulation, threaded=False, is_paused=True, link=link) as live,
-    ):
+    with linked(link) as live:
         live.publish(Parcel, content={(1, 2): {object()}})
         live.step(10)
         assert live.error is None
@@ -168,11 +165,7 @@ def test_objects_that_cannot_be_written_down_are_sent_as_others(link):
 
 
 def test_where_the_time_does_not_jump_orders_arrive():
-    link = OperatorLink(delay=1.0)
-    with (
-        Simulation(mission(), 1) as simulation,
-        Live(simulation, threaded=False, is_paused=True, link=link) as live,
-    ):
+    with linked(OperatorLink(delay=1.0)) as live:
         live.step(5)
         live.publish(Go, speed=1.0)
         live.step(5)
@@ -245,11 +238,7 @@ def watch(live, page, client):
 
 
 def test_what_people_see_is_late_in_the_time_of_the_game():
-    link = OperatorLink(see=0.5)
-    with (
-        Simulation(mission(), 1) as simulation, Live(simulation, is_paused=True, link=link) as live,
-        Page(live) as page, PageClient(page.url) as client,
-    ):  # fmt: skip
+    with browsed(mission(), 1, is_paused=True, link=OperatorLink(see=0.5)) as (live, page, client):
         client.order("choose", id=2)
         client.wait(lambda: client.status.get("entity") and client.status["entity"]["sections"])
         live.publish(Go, receivers=[2], speed=5.0, note="go")
@@ -277,12 +266,8 @@ def test_what_people_see_is_late_in_the_time_of_the_game():
 
 
 def test_the_end_of_a_game_is_seen_at_once_and_deaths_are_not_told_before():
-    link = OperatorLink(see=2.0)
     short = Mission(blocks=mission().blocks, dt=DT, end=3.0)
-    with (
-        Simulation(short, 1) as simulation, Live(simulation, is_paused=True, link=link) as live,
-        Page(live) as page, PageClient(page.url) as client,
-    ):  # fmt: skip
+    with browsed(short, 1, is_paused=True, link=OperatorLink(see=2.0)) as (live, page, client):
         client.wait(lambda: client.frame)
         live.step(5)
         live.remove([1])

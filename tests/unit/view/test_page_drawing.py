@@ -2,15 +2,12 @@
 
 import numpy as np
 import pytest
-from page_client import PageClient
+from page_client import browsed
 from recorded_games import hunt
 
-from tussle import Simulation
 from tussle.api.draw import KINDS
-from tussle.view import Live
 from tussle.view.drawn import Shape
 from tussle.view.page.drawing import ATTRIBUTES, DRAWN, drawing_message, read_drawing
-from tussle.view.page.server import Page
 
 
 def shape(kind, **attributes):
@@ -140,14 +137,9 @@ def test_nothing_drawn_is_a_message_without_parts():
 
 
 def test_all_kinds_reach_a_browser():
-    with (
-        Simulation(hunt(end=60.0), 3) as simulation,
-        Live(simulation, is_paused=True) as live,
-        Page(live) as page,
-        PageClient(page.url) as client,
-    ):
+    with browsed(hunt(end=60.0), 3, is_paused=True) as (live, page, client):
         client.wait(lambda: page.n_readers)
-        draw = simulation.state.context.draw
+        draw = live.simulation.state.context.draw
         client.wait(lambda: draw.sinks)
         for kind, given in EXAMPLES.items():
             getattr(draw, kind)(**given, lifetime=100.0)

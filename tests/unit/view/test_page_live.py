@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from aiohttp import ClientConnectionResetError
 from aiohttp.web import WebSocketResponse
-from page_client import PageClient
+from page_client import PageClient, browsed
 from recorded_games import hunt
 from watched_plugins import failing
 
@@ -21,12 +21,7 @@ from tussle.view.page.server import Page
 @pytest.fixture
 def game():
     """A page on a game that stands still at its beginning, and who watches it."""
-    with (
-        Simulation(hunt(end=60.0, end_conditions="time"), 3) as simulation,
-        Live(simulation, is_paused=True, pace=20.0) as live,
-        Page(live) as page,
-        PageClient(page.url) as client,
-    ):
+    with browsed(hunt(end=60.0, end_conditions="time"), 3, is_paused=True, pace=20.0) as (live, page, client):
         client.wait(lambda: client.n_frames and client.status)
         yield live, page, client
         assert page.error is None
@@ -151,12 +146,7 @@ def test_a_look_back_holds_what_was_seen(game):
 
 
 def test_a_plugin_that_fails_is_told_and_the_game_can_be_wound_back():
-    with (
-        Simulation(failing(), 1) as simulation,
-        Live(simulation, pace=None) as live,
-        Page(live) as page,
-        PageClient(page.url) as client,
-    ):
+    with browsed(failing(), 1, pace=None) as (live, page, client):
         client.wait(lambda: "it is late" in (client.status.get("error") or ""))
         assert page.game_error is live.error
         there = live.step_number

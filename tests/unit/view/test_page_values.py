@@ -5,14 +5,11 @@ import math
 import time
 
 import pytest
-from page_client import PageClient
+from page_client import browsed
 from recorded_games import hunt
 from watched_plugins import clickable
 
-from tussle import Simulation
 from tussle.errors import ParameterError
-from tussle.view import Live
-from tussle.view.page.server import Page
 
 NAN, INF = math.nan, math.inf
 NO_NUMBERS = (NAN, INF, -INF, 1e308, -1e308, 2**63, None, True, "5", "x" * 9000, [], [1.0], {}, 10**400)
@@ -21,12 +18,7 @@ NO_NUMBERS = (NAN, INF, -INF, 1e308, -1e308, 2**63, None, True, "5", "x" * 9000,
 @pytest.fixture(scope="module")
 def shared():
     """A page on a game that goes on."""
-    with (
-        Simulation(hunt(end=1e5, end_conditions="time"), 3) as simulation,
-        Live(simulation, pace=1.0) as live,
-        Page(live) as page,
-        PageClient(page.url) as client,
-    ):
+    with browsed(hunt(end=1e5, end_conditions="time"), 3, pace=1.0) as (live, page, client):
         client.wait(lambda: client.n_frames and client.status)
         yield live, page, client
 
@@ -149,12 +141,7 @@ def test_every_command_at_any_moment(game):
 
 
 def test_a_point_too_far_away_is_no_point():
-    with (
-        Simulation(clickable(), 1) as simulation,
-        Live(simulation, is_paused=True) as live,
-        Page(live) as page,
-        PageClient(page.url) as client,
-    ):
+    with browsed(clickable(), 1, is_paused=True) as (live, page, client):
         is_refused(client, "there is no ground there", lambda: client.order("point", pos=[1e9, 0, 0]))
         assert not live.injections
         assert page.error is None
@@ -166,12 +153,7 @@ def test_a_point_too_far_away_is_no_point():
 @pytest.fixture
 def fragile():
     """A page that will fail, on a game that goes on."""
-    with (
-        Simulation(hunt(end=1e5, end_conditions="time"), 3) as simulation,
-        Live(simulation, pace=1.0) as live,
-        Page(live) as page,
-        PageClient(page.url) as client,
-    ):
+    with browsed(hunt(end=1e5, end_conditions="time"), 3, pace=1.0) as (live, page, client):
         client.wait(lambda: client.n_frames and live.step_number > 3)
         yield live, page, client
 

@@ -29,8 +29,10 @@ def hashes_of(sim, steps):
 # -- the same bits ------------------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("memory", [256.0, 0.05])
-@pytest.mark.parametrize("name", ["chase_sequential", "births_and_radio", "slow_clocks", "cars"])
+@pytest.mark.parametrize(
+    ("name", "memory"),
+    [("chase_sequential", 0.05), ("births_and_radio", 0.05), ("births_and_radio", 256.0), ("slow_clocks", 0.05), ("cars", 256.0)],
+)  # fmt: skip
 def test_every_step_that_is_visited_again_has_the_state_it_had(name, memory):
     n = STEPS[name]
     hashes = hashes_of(simulation(name, 1), n)
@@ -264,25 +266,25 @@ def test_snapshots_stay_within_their_memory_and_lie_closer_near_the_present():
     sim = Simulation(clickable(end=1e4))
     one = memory_of(sim.snapshot())
     timeline = Timeline(sim, 0, every=0.1, limit=30 * one)
-    for step in range(2000):
+    for step in range(1000):
         timeline.keep(step)
         sim.step()
         assert timeline.size <= 31 * one
     steps = np.array(timeline.steps)
     assert steps[0] == 0
-    assert steps[-1] == 1999
+    assert steps[-1] == 999
     assert 25 <= len(steps) <= 31
     # Replaying from the snapshot before any step takes at most a part of the way back to it.
-    gap, age = np.diff(steps), 1999 - steps[:-1]
+    gap, age = np.diff(steps), 999 - steps[:-1]
     assert (gap <= np.maximum(2, 0.5 * age)).all()
     assert gap[-3:].max() <= 4
-    for step in (0, 5, 700, 1998, 1999, 5000):
+    for step in (0, 5, 700, 998, 999, 5000):
         found, snapshot = timeline.nearest(step)
         assert found == steps[steps <= step].max()
         assert snapshot.world["step"] == [found]
     assert timeline.nearest(-1) is None
-    timeline.forget_after(1000)
-    assert timeline.steps == [s for s in steps if s <= 1000]
+    timeline.forget_after(500)
+    assert timeline.steps == [s for s in steps if s <= 500]
     timeline.clear()
     assert (timeline.steps, timeline.size) == ([], 0)
 
