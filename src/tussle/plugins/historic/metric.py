@@ -1,11 +1,32 @@
-"""SimpleCollisionMetrics as in SCRIMMAGE."""
+"""Metrics with the laws of SCRIMMAGE."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from tussle.api import State, WorldView
-from tussle.plugins.stock.metric import simple_collision_metrics
+from tussle.plugins.stock.metric import cpa, simple_capture_metrics, simple_collision_metrics
+
+
+class CPA(cpa.CPA):
+    """CPA whose times are those of the start of the step, though the distances are those of its end."""
+
+    def _now(self, w: WorldView) -> np.ndarray:
+        return w.t - w.context.clock.dt
+
+
+class SimpleCaptureMetrics(simple_capture_metrics.SimpleCaptureMetrics):
+    """SimpleCaptureMetrics that counts no captures by teams which first appear after the first step."""
+
+    is_listed = State(dtype=bool, per="team", doc="Whether the team was there in the first step.")
+
+    def step(self, w: WorldView) -> None:
+        is_first = w.step_count[w.world] == 0
+        self.is_listed[w.team_numbers(w.team[is_first]), w.world[is_first]] = True
+        super().step(w)
+
+    def result(self, w: WorldView) -> dict[str, np.ndarray]:
+        return {name: np.where(self.is_listed, count, 0) for name, count in super().result(w).items()}
 
 
 class SimpleCollisionMetrics(simple_collision_metrics.SimpleCollisionMetrics):

@@ -1,4 +1,4 @@
-"""SphereNetwork as in SCRIMMAGE."""
+"""Networks with the laws of SCRIMMAGE."""
 
 from __future__ import annotations
 
@@ -7,7 +7,19 @@ from collections.abc import Sequence
 import numpy as np
 
 from tussle.api import Links, Messages, WorldView
-from tussle.plugins.stock.network import sphere_network
+from tussle.plugins.stock.network import global_network, local_network, sphere_network
+
+
+class GlobalNetwork(global_network.GlobalNetwork):
+    """GlobalNetwork that holds delayed messages back until another message is published on their topic, however late that is."""
+
+    waits_for_traffic = True
+
+
+class LocalNetwork(local_network.LocalNetwork):
+    """LocalNetwork that holds delayed messages back until another message is published on their topic, however late that is."""
+
+    waits_for_traffic = True
 
 
 class SphereNetwork(sphere_network.SphereNetwork):

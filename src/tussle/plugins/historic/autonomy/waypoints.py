@@ -1,12 +1,31 @@
-"""WaypointDispatcher as in SCRIMMAGE."""
+"""Autonomies that make and follow waypoints, as in SCRIMMAGE."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from tussle.api import GroupView, Messages
+from tussle.api import GroupView, Messages, State
 from tussle.declare.messages import WAYPOINT_MODES
-from tussle.plugins.stock.autonomy import waypoint_dispatcher
+from tussle.plugins.stock.autonomy import waypoint_dispatcher, waypoint_generator
+
+
+class WaypointGenerator(waypoint_generator.WaypointGenerator):
+    """WaypointGenerator whose clock adds dt in each step, and so may reach the time of a waypoint one step late by rounding.
+
+    tussle's time is start + k dt, and a waypoint is due at the step next to its time.
+    """
+
+    clock = State(unit="s", doc="Sum of the steps since the start.")
+
+    def spawn(self, g: GroupView, rows: np.ndarray) -> None:
+        for row, n_steps in zip(rows, g.step_count[rows], strict=True):
+            self.clock[row] = np.cumsum([g.context.clock.start, *[g.dt] * n_steps])[-1]
+
+    def _now(self, g: GroupView) -> np.ndarray:
+        now: np.ndarray = self.clock.copy()
+        self.clock[:] += g.dt
+        return now
+
 
 FOLLOW_ONCE, BACK_AND_FORTH, LOITER, RACETRACK = range(len(WAYPOINT_MODES))
 

@@ -1,12 +1,14 @@
-"""MotionBattery as in SCRIMMAGE."""
+"""Controllers that count the energy of a vehicle, as in SCRIMMAGE."""
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
-from tussle.api import GroupView, Publish
+from tussle.api import GroupView, Publish, row_law
 from tussle.declare.messages import RemoveEntity
-from tussle.plugins.stock.controller import motion_battery
+from tussle.plugins.stock.controller import motion_battery, uuv_6dof_linear_energy
 from tussle.plugins.stock.controller.motion_battery import depletions
 
 
@@ -37,3 +39,22 @@ class MotionBattery(motion_battery.MotionBattery):
             span = self.charge_max - self.charge_min
             share = np.divide(self.charge - self.charge_min, span, out=np.zeros(g.n), where=span > 0.0)
             self.reported.publish(np.arange(g.n), percentage=100.0 * share)
+
+
+class UUV6DOFLinearEnergy(uuv_6dof_linear_energy.UUV6DOFLinearEnergy):
+    """UUV6DOFLinearEnergy that a negative throttle charges, without limits of the energy.
+
+    The energy of a call counts in the same call. In tussle the size of the throttle is taken.
+    """
+
+    def spawn(self, g: GroupView, rows: np.ndarray) -> None:
+        """Charge the battery."""
+        self.energy[rows] = self.energy_initial[rows]
+
+    @row_law("passed", "energy")
+    @staticmethod
+    def deplete(command: Any, energy_min: float, energy: float, dt: float) -> Any:
+        """Take the energy, and pass the commands."""
+        throttle, elevator, rudder = command
+        left = energy - throttle * dt
+        return (throttle if left > energy_min else 0.0, elevator, rudder), left
