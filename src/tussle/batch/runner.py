@@ -17,12 +17,11 @@ import pyarrow.compute as pc
 from tussle.batch import store as files
 from tussle.batch.executors import Executor, InProcess, Processes
 from tussle.batch.plan import BatchPlan
-from tussle.batch.progress import Progress
 from tussle.batch.results import Results
 from tussle.batch.sequential import Question, Rule, SequentialStop
 from tussle.batch.stopping import Stop
 from tussle.batch.store import Store, StoredBatch
-from tussle.batch.tasks import BatchRun, Finished, Package
+from tussle.batch.tasks import BatchRun, Finished, Package, Progress
 from tussle.batch.trust import remember
 from tussle.batch.variables import Variable
 from tussle.batch.varied import entries_text

@@ -18,8 +18,7 @@ from tussle.api import (
     Param,
     Publish,
 )
-from tussle.api.channel_map import ChannelMapParam, channel_outputs, write_channels
-from tussle.api.channels import CHANNEL_UNITS
+from tussle.api.channel_map import CHANNEL_UNITS, ChannelMapParam, channel_outputs, write_channels
 from tussle.errors import ParameterError
 from tussle.plugins.stock.autonomy.joystick.device import JoystickDevice
 

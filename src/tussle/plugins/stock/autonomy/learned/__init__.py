@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from tussle.api import Autonomy, GroupView, Output, Param, State
-from tussle.api.channels import CHANNEL_UNITS
+from tussle.api.channel_map import CHANNEL_UNITS
 from tussle.plugins import stock
 
 SHIPPED = Path(str(files("tussle.plugins.stock.autonomy.learned")))

@@ -15,8 +15,7 @@ import numpy as np
 from tussle.api import Autonomy, GroupView, Handle, HistoricAttributes, Output, Param, State
 from tussle.errors import MissingFileError, ParameterError
 from tussle.plugins.stock.autonomy.moos import wire
-from tussle.plugins.stock.autonomy.moos.mission_file import community_of
-from tussle.plugins.stock.autonomy.moos.vessel import Vessel
+from tussle.plugins.stock.autonomy.moos.vessel import Vessel, community_of
 
 NAVIGATION = ("NAV_X", "NAV_Y", "NAV_HEADING", "NAV_SPEED", "NAV_DEPTH")
 MAX_PORT = 65535

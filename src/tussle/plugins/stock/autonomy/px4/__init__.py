@@ -11,8 +11,7 @@ from tussle.api.channel_map import ChannelMapParam
 from tussle.errors import MissingExtraError
 from tussle.plugins.links.autopilots.link import MAX_PORT, resolved
 from tussle.plugins.links.autopilots.plugin import Autopilot
-from tussle.plugins.stock.autonomy.px4.link import Px4Link
-from tussle.plugins.stock.autonomy.px4.sensors import SensorSuite
+from tussle.plugins.stock.autonomy.px4.link import Px4Link, SensorSuite
 
 N_CONTROLS = 16
 N_DRAWS = 10

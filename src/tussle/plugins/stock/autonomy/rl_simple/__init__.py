@@ -15,8 +15,7 @@ from tussle.api import Autonomy, GroupView, Handle, HistoricAttributes, Input, O
 from tussle.declare.messages import RewardGiven
 from tussle.errors import ParameterError, clipped
 from tussle.numeric import clip
-from tussle.plugins.stock.autonomy.rl_simple.actors import Alternating, spaces_of
-from tussle.plugins.stock.autonomy.rl_simple.remote import ActorServer, RemoteActor
+from tussle.plugins.stock.autonomy.rl_simple.actors import ActorServer, Alternating, RemoteActor, spaces_of
 
 DEFAULT_MODULE = "scrimmage.openai.tests.test_openai"
 DEFAULT_FUNCTION = "actor_init_func"

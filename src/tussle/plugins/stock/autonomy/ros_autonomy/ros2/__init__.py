@@ -1,7 +1,5 @@
 """Robots that are driven by nodes of ROS 2."""
 
-from __future__ import annotations
-
 from tussle.plugins.links.ros.dds import Ros2Link
 from tussle.plugins.stock.autonomy.ros_autonomy import PublishedByROS
 

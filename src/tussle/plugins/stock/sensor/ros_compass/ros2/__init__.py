@@ -1,7 +1,5 @@
 """The direction of North for nodes of ROS 2."""
 
-from __future__ import annotations
-
 from tussle.plugins.links.ros.dds import Ros2Link
 from tussle.plugins.stock.sensor.ros_compass import CompassByROS
 
