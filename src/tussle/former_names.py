@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from importlib import import_module
 from importlib.abc import Loader, MetaPathFinder
 from importlib.machinery import ModuleSpec
+from importlib.util import find_spec
 from types import ModuleType
 
 GOES_IN = "0.2"
@@ -41,19 +42,39 @@ class FormerNames(MetaPathFinder, Loader):
     def exec_module(self, module: ModuleType) -> None:
         """Import the module by its present name, and put it in the place of the former one."""
         former = module.__name__
-        name = former.removeprefix("tussle.")
-        present = f"tussle.{FORMER[name.partition('.')[0]]}.{name}"
-        package, _, last = present.rpartition(".")
-        if last == "plugin" and not hasattr(import_module(package), "__path__"):
-            present = package  # a plugin that was a folder and is a file now
+        present = _present_name(former)
         text = f"{former} is {present} now; the former name goes in version {GOES_IN}"
         warnings.warn(text, DeprecationWarning, stacklevel=2)
         found = import_module(present)
-        if former.startswith("tussle.stock.") and not hasattr(found, "__path__") and last != "plugin":
+        is_plugin = former.startswith("tussle.stock.") and not former.endswith(".plugin")
+        if (is_plugin or _is_historic(former)) and not hasattr(found, "__path__"):
             vars(module).update({name: value for name, value in vars(found).items() if name[:2] != "__"})
             module.__path__ = []  # of the folder that it was, whose modules are asked for next
         else:
             sys.modules[former] = found
+
+
+def _present_name(former: str) -> str:
+    name = former.removeprefix("tussle.")
+    present = f"tussle.{FORMER[name.partition('.')[0]]}.{name}"
+    if _is_module(present):
+        return present
+    if name.endswith(".plugin"):
+        return present.removesuffix(".plugin")
+    return "tussle.plugins.historic" if _is_historic(former) else present
+
+
+def _is_historic(former: str) -> bool:
+    """Whether it was a module of plugins with SCRIMMAGE's laws: they had the names of the modules of stock plugins."""
+    room, _, name = former.removeprefix("tussle.").partition(".")
+    return room == "historic" and _is_module(f"tussle.plugins.stock.{name}")
+
+
+def _is_module(name: str) -> bool:
+    try:
+        return find_spec(name) is not None
+    except ModuleNotFoundError:  # what the name says is its package is not one
+        return False
 
 
 def install() -> None:

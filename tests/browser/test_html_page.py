@@ -16,7 +16,7 @@ from tussle.mission import read_mission
 from tussle.stock import Still
 from tussle.view import Recording
 from tussle.view.export.html import write_html
-from tussle.view.terrain import Terrain
+from tussle.view.solids import Terrain
 
 READY = "Boolean(window.player && player.isReady)"
 

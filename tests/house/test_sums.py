@@ -13,7 +13,6 @@ WHOLE = {
     "src/tussle/world/rays/files.py": "vertices of the faces of a file",
     "src/tussle/plugins/stock/autonomy/moos/wire.py": "lengths of messages",
     "src/tussle/plugins/stock/autonomy/rl_simple/actors.py": "actors with whole actions",
-    "src/tussle/plugins/stock/autonomy/rl_simple/remote.py": "actors with whole actions",
 }
 """Modules that sum whole numbers."""
 

@@ -16,8 +16,10 @@ MOVED = {
     "tussle.neighbors.walk": "tussle.numeric.neighbors.walk",
     "tussle.rays.files": "tussle.world.rays.files",
     "tussle.ros.link": "tussle.plugins.links.ros.link",
-    "tussle.stock.autonomy.boids.plugin": "tussle.plugins.stock.autonomy.boids.plugin",
+    "tussle.stock.autonomy.boids.plugin": "tussle.plugins.stock.autonomy.boids",
     "tussle.stock.autonomy.straight.plugin": "tussle.plugins.stock.autonomy.straight",
+    "tussle.historic.autonomy.predator": "tussle.plugins.historic",
+    "tussle.historic.sensor.gps": "tussle.plugins.historic",
     "tussle.historic.pid": "tussle.plugins.historic.pid",
     "tussle.plan.sst": "tussle.plugins.plan.sst",
     "tussle.serve.session": "tussle.view.serve.session",
@@ -63,17 +65,25 @@ def test_a_doorway_opens_without_a_warning(name):
 
 @pytest.mark.filterwarnings("ignore:tussle.* is tussle.* now")
 @pytest.mark.parametrize(
-    "module", ["tussle.stock.autonomy.straight", "tussle.stock.autonomy.straight.plugin"]
+    ("module", "name"),
+    [
+        ("tussle.stock.autonomy.straight", "Straight"),
+        ("tussle.stock.autonomy.straight.plugin", "Straight"),
+        ("tussle.stock.motion.unicycle.plugin", "Unicycle"),
+        ("tussle.historic.autonomy.predator", "Predator"),
+        ("tussle.historic.sensor.gps", "GPS"),
+        ("tussle.historic.motion.simple_car", "SimpleCar"),
+    ],
 )
-def test_a_pickle_of_before_loads(module):
-    from tussle.stock import Straight
+def test_a_pickle_of_before_loads(module, name):
+    room = importlib.import_module(f"tussle.{module.split('.')[1]}")
+    assert pickle.loads(f"c{module}\n{name}\n.".encode()) is getattr(room, name)
 
-    assert pickle.loads(f"c{module}\nStraight\n.".encode()) is Straight
 
-
-def test_a_name_that_never_was_is_not_found():
+@pytest.mark.parametrize("room", ["stock", "historic"])
+def test_a_name_that_never_was_is_not_found(room):
     with (
-        pytest.raises(ModuleNotFoundError, match=r"tussle\.plugins\.stock\.autonomy\.nowhere"),
+        pytest.raises(ModuleNotFoundError, match=rf"tussle\.plugins\.{room}\.autonomy\.nowhere"),
         pytest.deprecated_call(),
     ):
-        importlib.import_module("tussle.stock.autonomy.nowhere")
+        importlib.import_module(f"tussle.{room}.autonomy.nowhere")

@@ -1,13 +1,68 @@
-"""Aerodynamic forces and moments."""
+"""Reference lengths, aerodynamics, and other forces and moments from outside."""
 
 from __future__ import annotations
+
+import math
+from dataclasses import dataclass
 
 from tussle.aircraft.code import Code
 from tussle.aircraft.equations import offer
 from tussle.aircraft.functions import emit_function, expression, only
-from tussle.aircraft.metrics import Metrics
 from tussle.aircraft.node import Element
 from tussle.errors import clipped
+from tussle.numeric import total
+
+
+@dataclass(frozen=True)
+class Metrics:
+    """Reference lengths [ft], areas [ft^2], incidence of the wing [rad], places in the structural frame [in]."""
+
+    area: float
+    span: float
+    chord: float
+    incidence: float
+    tail_arm: float
+    tail_area: float
+    fin_arm: float
+    fin_area: float
+    reference: tuple[float, float, float]
+    eye: tuple[float, float, float]
+    visual: tuple[float, float, float]
+
+
+def read_metrics(node: Element) -> Metrics:
+    """Read <metrics>.
+
+    Raises:
+        AircraftError: A number is none.
+    """
+    places = {each.get("name"): each.vector("IN") for each in node.find_all("location")}
+    zero = 0.0, 0.0, 0.0
+    return Metrics(
+        node.value("wingarea", 0.0, "FT2"), node.value("wingspan", 0.0, "FT"), node.value("chord", 0.0, "FT"),
+        node.value("wing_incidence", 0.0, "RAD"), node.value("htailarm", 0.0, "FT"), node.value("htailarea", 0.0, "FT2"),
+        node.value("vtailarm", 0.0, "FT"), node.value("vtailarea", 0.0, "FT2"),
+        places.get("AERORP", zero), places.get("EYEPOINT", zero), places.get("VRP", zero),
+    )  # fmt: skip
+
+
+def offer_metrics(code: Code, m: Metrics) -> None:
+    """Make the properties of the metrics constants."""
+    code.constants |= {
+        "metrics/Sw-sqft": m.area, "metrics/bw-ft": m.span, "metrics/cbarw-ft": m.chord, "metrics/iw-rad": m.incidence,
+        "metrics/iw-deg": math.degrees(m.incidence), "metrics/lh-ft": m.tail_arm, "metrics/Sh-sqft": m.tail_area,
+        "metrics/lv-ft": m.fin_arm, "metrics/Sv-sqft": m.fin_area,
+        "metrics/aero-rp-x-in": m.reference[0], "metrics/aero-rp-y-in": m.reference[1], "metrics/aero-rp-z-in": m.reference[2],
+        "metrics/eyepoint-x-in": m.eye[0], "metrics/eyepoint-y-in": m.eye[1], "metrics/eyepoint-z-in": m.eye[2],
+        "metrics/visualrefpoint-x-in": m.visual[0], "metrics/visualrefpoint-y-in": m.visual[1], "metrics/visualrefpoint-z-in": m.visual[2],
+    }  # fmt: skip
+    if m.chord:
+        code.constants |= {"metrics/lh-norm": m.tail_arm / m.chord, "metrics/lv-norm": m.fin_arm / m.chord}
+        if m.area:
+            code.constants["metrics/vbarh-norm"] = m.tail_arm * m.tail_area / (m.chord * m.area)
+    if m.span and m.area:
+        code.constants["metrics/vbarv-norm"] = m.fin_arm * m.fin_area / (m.span * m.area)
+
 
 FORCES = {"DRAG": 0, "SIDE": 1, "LIFT": 2, "AXIAL": 0, "NORMAL": 2, "X": 0, "Y": 1, "Z": 2}
 MOMENTS = {"ROLL": 0, "PITCH": 1, "YAW": 2}
@@ -157,3 +212,78 @@ aero_mz = {mz} + ref_x * aero_fy - ref_y * aero_fx
         "forces/fwx-aero-lbs": "-wind_fx", "forces/fwy-aero-lbs": "wind_fy", "forces/fwz-aero-lbs": lift,
         "forces/lod-norm": f"quotient({lift}, -wind_fx)",
     })  # fmt: skip
+
+
+LOCAL_TO_BODY = (("l11", "l12", "l13"), ("l21", "l22", "l23"), ("l31", "l32", "l33"))
+INERTIAL_TO_BODY = (("m11", "m12", "m13"), ("m21", "m22", "m23"), ("m31", "m32", "m33"))
+BODY = (("1.0", "0.0", "0.0"), ("0.0", "1.0", "0.0"), ("0.0", "0.0", "1.0"))
+FORCE_FRAMES = {"BODY": BODY, "LOCAL": LOCAL_TO_BODY, "WIND": WIND_TO_BODY, "INERTIAL": INERTIAL_TO_BODY}
+
+
+def emit_external(code: Code, node: Element | None) -> None:
+    """Emit the locals ext_fx ... ext_mz of <external_reactions>.
+
+    Raises:
+        AircraftError: A frame is not known.
+    """
+    code.line("ext_fx = ext_fy = ext_fz = ext_mx = ext_my = ext_mz = 0.0")
+    for each in node or ():
+        if each.tag == "property":
+            code.initial.setdefault(each.text, each.attribute_number("value", 0.0))
+            code.inputs.add(each.text)
+        elif each.tag == "function":
+            emit_function(code, each)
+        elif each.tag in ("force", "moment"):
+            _emit_one(code, each)
+        elif each.tag not in ("description", "documentation"):
+            raise each.error("it is not supported; there are: force, moment, function, property")
+
+
+def _emit_one(code: Code, node: Element) -> None:
+    is_moment = node.tag == "moment"
+    name, letters = f"external_reactions/{node.get('name')}", "lmn" if is_moment else "xyz"
+    frame = (node.get("frame") or "BODY").upper()
+    if frame not in FORCE_FRAMES:
+        raise node.error(f"frame {clipped(frame)!r} is not known; there are: {', '.join(FORCE_FRAMES)}")
+    function = node.find("function")
+    size = f"{name}/magnitude-lbsft" if is_moment else f"{name}/magnitude"
+    if function is not None:
+        amount = emit_function(code, function)
+    else:
+        code.initial.setdefault(size, 0.0)
+        code.inputs.add(size)
+        amount = code.read(size)
+    direction = node.find("direction")
+    ways = direction.vector("IN") if direction else (0.0, 0.0, 0.0)
+    length = math.sqrt(total(way * way for way in ways)) or 1.0
+    vector = []
+    for letter, way in zip(letters, ways, strict=True):
+        code.initial.setdefault(f"{name}/{letter}", way / length)
+        code.inputs.add(f"{name}/{letter}")
+        vector.append(code.temporary(f"{amount} * {code.read(f'{name}/{letter}')}"))
+    x, y, z = (
+        code.temporary(each) for each in turned(FORCE_FRAMES[frame], (vector[0], vector[1], vector[2]))
+    )
+    if is_moment:
+        code.line(f"ext_mx += {x}")
+        code.line(f"ext_my += {y}")
+        code.line(f"ext_mz += {z}")
+        return
+    place = node.find("location")
+    arm = []
+    for letter, inches in zip("xyz", place.vector("IN") if place else (0.0, 0.0, 0.0), strict=True):
+        full = f"{name}/location-{letter}-in"
+        code.initial.setdefault(full, inches)
+        code.inputs.add(full)
+        arm.append(code.read(full))
+    code.lines(f"""
+arm_x = (cg_x - {arm[0]}) / 12.0
+arm_y = ({arm[1]} - cg_y) / 12.0
+arm_z = (cg_z - {arm[2]}) / 12.0
+ext_fx += {x}
+ext_fy += {y}
+ext_fz += {z}
+ext_mx += arm_y * {z} - arm_z * {y}
+ext_my += arm_z * {x} - arm_x * {z}
+ext_mz += arm_x * {y} - arm_y * {x}
+""")

@@ -1,7 +1,5 @@
 """The standard atmosphere and airspeeds, for generated code."""
 
-from __future__ import annotations
-
 import math
 
 from tussle.aircraft.constants import (

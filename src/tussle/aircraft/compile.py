@@ -15,7 +15,7 @@ import numpy as np
 
 from tussle import numeric
 from tussle.aircraft import air, contact, runtime
-from tussle.aircraft.aerodynamics import emit_aerodynamics
+from tussle.aircraft.aerodynamics import emit_aerodynamics, emit_external, offer_metrics, read_metrics
 from tussle.aircraft.buoyancy import emit_buoyancy, read_buoyancy
 from tussle.aircraft.code import STATE, Code, normal
 from tussle.aircraft.contact import WIDTH
@@ -31,11 +31,9 @@ from tussle.aircraft.equations import (
     lever,
     offer,
 )
-from tussle.aircraft.external import emit_external
 from tussle.aircraft.files import Files
 from tussle.aircraft.ground import emit_ground, offer_steering, read_ground
 from tussle.aircraft.mass import emit_mass, read_mass
-from tussle.aircraft.metrics import offer_metrics, read_metrics
 from tussle.aircraft.node import Element
 from tussle.aircraft.propulsion import RUNTIME, Propulsion, read_propulsion
 from tussle.errors import ParameterError, clipped, nearest_name

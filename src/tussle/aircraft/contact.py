@@ -3,8 +3,6 @@
 Friction is found as Lagrange multipliers by a projected Gauss-Seidel method (E. Catto 2005, "Iterative dynamics with temporal coherence").
 """
 
-from __future__ import annotations
-
 import math
 
 from tussle.aircraft.constants import AXIS_RATIO, AXIS_RATIO_SQUARED, ECCENTRICITY_SQUARED, SEMI_MAJOR

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from xml.parsers import expat
 
-from tussle.aircraft.units import factor
+from tussle.aircraft.constants import factor
 from tussle.documents import read_bytes
 from tussle.errors import ParameterError, clipped
 

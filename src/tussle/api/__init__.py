@@ -21,6 +21,7 @@ from tussle.api.kinds import (
     Metric,
     Network,
     Sensor,
+    StateFollower,
     WorldPlugin,
 )
 from tussle.api.laws import neighbors, together
@@ -30,7 +31,6 @@ from tussle.api.motion import MotionBody, MotionModel
 from tussle.api.plugin import HistoricAttributes, Plugin, service
 from tussle.api.rigid_body import InertiaParam, PositiveParam, RigidBodyModel
 from tussle.api.row_laws import row_law
-from tussle.api.state_follower import StateFollower
 from tussle.api.world import WorldView
 from tussle.declare.columns import (
     Children,

@@ -1,7 +1,5 @@
 """Kernels of the views: attitudes, rows by id, checks."""
 
-from __future__ import annotations
-
 import math
 
 from tussle.numeric import atan2

@@ -2,20 +2,50 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import sys
+from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
 import numpy as np
 
 from tussle.api.group import GroupView
 from tussle.api.plugin import HistoricAttributes, Plugin
-from tussle.api.results import named, number
 from tussle.api.row_laws import step_rows
 from tussle.api.world import WorldView
-from tussle.declare.columns import EntityRef, Numbers, Output, Param, State
-from tussle.declare.messages import Messages
+from tussle.declare.columns import EntityRef, Numbers, Output, Param, State, Subscribe
+from tussle.declare.messages import Messages, TextMessage
 from tussle.errors import DeclarationError, ParameterError
 from tussle.world.scene import HeightField, TeamRegion, Volume
+
+
+def named(found: Any, where: str) -> Mapping[str, Any]:
+    """Return results by name.
+
+    Raises:
+        ParameterError: They are no dict, or have a name that is no text.
+    """
+    if not isinstance(found, Mapping):
+        raise ParameterError(f"{where} returns {found!r:.60}; it takes a dict, {{'name': value}}")
+    for name in found:
+        if not (isinstance(name, str) and name):
+            raise ParameterError(f"{where}: {name!r:.60} is not a name; it takes a text")
+    return found
+
+
+def number(value: Any, where: str, allowed: str) -> bool | int | float:
+    """Return a number of a result.
+
+    Raises:
+        ParameterError: It is none, or too long for tables.
+    """
+    found = value.item() if isinstance(value, np.generic | np.ndarray) and value.ndim == 0 else value
+    if not isinstance(found, (bool, int, float)):
+        raise ParameterError(f"{where} = {value!r:.60} is not allowed; it takes {allowed}")
+    if isinstance(found, int) and abs(found) > sys.float_info.max:
+        raise ParameterError(
+            f"{where} is a whole number of {found.bit_length():,} bits; it takes up to 1,024"
+        )
+    return found
 
 
 class EntityPlugin(Plugin):
@@ -220,3 +250,45 @@ class Network(WorldPlugin):
             return {}
         lost = {f"lost_{name}": self.link_counts[1 + i] for i, name in enumerate(self.losses)}
         return {"sent": self.link_counts.sum(axis=0), "delivered": self.link_counts[0], **lost}
+
+
+class StateFollower(Autonomy):
+    """An autonomy with plugins inside that act in some states of the entity; abstract.
+
+    The state is the last text that the entity received on the topic `state_topic_name` of the network that the subclass names in its
+    parameter `network_name`. Inner plugins with `states` act in these, the others always. Before the first text only the latter act.
+    """
+
+    state_topic_name = Param("State", doc="Topic of the entity's state.")
+    state = State(
+        dtype=int, default=-1, doc="Number of the state among those named by inner plugins; -1 for others."
+    )
+    told_state = Subscribe(TextMessage, network_param="network_name", topic_param="state_topic_name")
+
+    def unused_states(self) -> tuple[str, ...]:
+        """Return `state` if no inner plugin has states."""
+        return () if self._names() else ("state",)
+
+    def read_state(self) -> None:
+        """Update `state` with the messages received; call it once in each step."""
+        names = self._names()
+        if names and self.told_state:
+            rows, received = self.told_state.latest()
+            number = {name: i for i, name in enumerate(names)}
+            self.state[rows] = [number.get(text, -1) for text in received.text]
+
+    def acts(self, plugin: Any, state: np.ndarray | None = None) -> np.ndarray | None:
+        """Return True if an inner plugin acts in each row, (n,), for `g.step`; None if it always acts.
+
+        Args:
+            plugin: The inner plugin.
+            state: State numbers, (n,); by default the present ones.
+        """
+        if not plugin.active_in:
+            return None
+        names = self._names()
+        return np.isin(self.state if state is None else state, [names.index(n) for n in plugin.active_in])
+
+    def _names(self) -> list[str]:
+        inner = [p for key in self.children() for p in self.values[key]]
+        return sorted({name for p in inner for name in p.active_in})

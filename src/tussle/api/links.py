@@ -11,7 +11,7 @@ from tussle.api.world import WorldView
 from tussle.arguments import explained
 from tussle.declare.messages import Messages
 from tussle.errors import ParameterError
-from tussle.numeric.segments import order_by_row
+from tussle.numeric.arrays import order_by_row
 
 BLOCKS = ("nothing", "scene", "scene and entities")
 """Kinds of obstacles between a sender and a receiver."""

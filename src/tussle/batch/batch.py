@@ -47,11 +47,11 @@ from tussle.palette import team_colours
 from tussle.record.run_file import versions
 
 if TYPE_CHECKING:
-    from tussle.batch.progress import Progress
     from tussle.batch.results import Results
     from tussle.batch.sequential import Rule
+    from tussle.batch.stopping import Until
     from tussle.batch.target import Target
-    from tussle.batch.until import Until
+    from tussle.batch.tasks import Progress
 
 MAX_CHECKED = 16
 """Groups of which one game is started before the batch, so that errors of the mission show at once."""

@@ -24,6 +24,7 @@ from tussle.batch.default_quantities import (
 )
 from tussle.batch.quantities import Quantity, column_name, metric_of
 from tussle.batch.response import Response, fitted
+from tussle.batch.run_table import N_TIMES, Survival, survival_of
 from tussle.batch.selection import is_number, known_point, original, paired_points, select_points, with_unit
 from tussle.batch.sensitivity import Effect, effects, rank_effects
 from tussle.batch.statistics import (
@@ -37,7 +38,6 @@ from tussle.batch.statistics import (
     share_of,
 )
 from tussle.batch.store import RUNS
-from tussle.batch.survival import N_TIMES, Survival, survival_of
 from tussle.batch.target import Answers, Layout, Target, answers_of, crossing_of
 from tussle.batch.variables import Variable
 from tussle.batch.varied import variable_of

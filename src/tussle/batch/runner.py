@@ -16,13 +16,12 @@ from tussle.batch import store as files
 from tussle.batch.executors import Executor, InProcess, Processes
 from tussle.batch.finished_runs import FinishedRuns, finished_in, last_finished, run_seconds, tables
 from tussle.batch.plan import BatchPlan
-from tussle.batch.progress import Progress
 from tussle.batch.results import Results
 from tussle.batch.schemas import ALIVE, ALIVE_FILE, BATCH_FILE, DESIGN_FILE, RESULTS, RESULTS_FILE
 from tussle.batch.sequential import Question, Rule, SequentialStop
 from tussle.batch.stopping import Stop
 from tussle.batch.store import Store, StoredBatch
-from tussle.batch.tasks import BatchRun, Finished, Package
+from tussle.batch.tasks import BatchRun, Finished, Package, Progress
 from tussle.batch.trust import remember
 from tussle.batch.variables import Variable
 from tussle.batch.varied import entries_text

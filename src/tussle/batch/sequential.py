@@ -13,10 +13,9 @@ from tussle.batch.plan import BatchPlan
 from tussle.batch.quantities import Quantity
 from tussle.batch.sequential_intervals import sequential_interval
 from tussle.batch.statistics import LEVEL
-from tussle.batch.stopping import PlayedQuantities
+from tussle.batch.stopping import PlayedQuantities, Until
 from tussle.batch.target import Answers, Layout, Target, answers_of
 from tussle.batch.tasks import Finished
-from tussle.batch.until import Until
 from tussle.batch.variables import Variable
 from tussle.errors import ParameterError
 

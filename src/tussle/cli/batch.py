@@ -21,7 +21,6 @@ from tussle.batch import store
 from tussle.batch.batch import Batch
 from tussle.batch.executors import Executor
 from tussle.batch.further import RUNS, further_runs
-from tussle.batch.progress import Progress as BatchProgress
 from tussle.batch.quantities import column_name
 from tussle.batch.reload import planned_run
 from tussle.batch.results import Results
@@ -30,6 +29,7 @@ from tussle.batch.sequential import rule_of
 from tussle.batch.statistics import Share, running_result, scipy_package
 from tussle.batch.sweep_file import Sweep, read_sweep
 from tussle.batch.target import estimate_text
+from tussle.batch.tasks import Progress as BatchProgress
 from tussle.batch.trust import digest
 from tussle.batch.variables import Variable, parse_variable
 from tussle.cli.batch_options import BatchOptions

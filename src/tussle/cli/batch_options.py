@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
 
 import typer
 
@@ -23,91 +22,65 @@ from tussle.cli.options import (
 class PoolOptions(MissionOptions):
     """Options shared by all commands that play many games."""
 
-    seed: Annotated[
-        int | None, option("N", "First seed; by default 1. The others follow it.", min=0, max=MAX_SEED)
-    ] = None
-    processes: Annotated[int | None, option("N", "Number of processes; by default one per core.", min=1)] = (
-        None
+    seed: int | None = option("N", "First seed; by default 1. The others follow it.", min=0, max=MAX_SEED)
+    processes: int | None = option("N", "Number of processes; by default one per core.", min=1)
+    stack: int | None = option(
+        "N", "Games played side by side in each process; by default chosen by the mission.", min=1
     )
-    stack: Annotated[
-        int | None,
-        option("N", "Games played side by side in each process; by default chosen by the mission.", min=1),
-    ] = None
-    run_timeout: Annotated[
-        float | None,
-        option(
-            "S", "Stop a game that takes longer than S seconds, and record it as failed; by default never."
-        ),
-    ] = None
+    run_timeout: float | None = option(
+        "S", "Stop a game that takes longer than S seconds, and record it as failed; by default never."
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
 class ManyGamesOptions(PoolOptions):
     """Options shared by batches and searches."""
 
-    vary: Annotated[
-        list[str],
-        option(
-            "NAME=VALUES",
-            "Vary a value: speed=20:30, prey.count=50:100:int, gain=1e-3:10:log, tactic=keep,switch. Can be repeated.",
-        ),
-    ] = field(default_factory=list)
+    vary: list[str] = option(
+        "NAME=VALUES",
+        "Vary a value: speed=20:30, prey.count=50:100:int, gain=1e-3:10:log, tactic=keep,switch. Can be repeated.",
+        default=list,
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
 class BatchOptions(ManyGamesOptions):
     """Play a game many times, with other seeds and values, and show who wins how often."""
 
-    runs: Annotated[
-        int | None,
-        option(
-            "N",
-            "Games of each point, that is of each set of varied values; by default as the sweep file says, or 100.",
-            "--runs",
-            "-n",
-            min=1,
-        ),
-    ] = None
-    sweep: Annotated[
-        Path | None, option("FILE", "A sweep file (TOML) or ranges file (XML) with the varied values.")
-    ] = None
-    sample: Annotated[
-        str | None, option("METHOD", "Sampling method: lhs, sobol, saltelli, grid, list, product.")
-    ] = None
-    samples: Annotated[int | None, option("N", "Number of points to sample.", min=1)] = None
-    sample_seed: Annotated[int | None, option("N", "Seed of the sampling; by default 0.", min=0)] = None
-    independent: Annotated[
-        bool, flag("--independent", "Each game has its own seed, instead of the same seeds at all points.")
-    ] = False
-    until: Annotated[
-        str | None,
-        option(
-            "WIDTH",
-            "Stop when half of a 95 % interval is this narrow: 0.02 (share of wins of each team), 'score[2]:0.5'. Or play only "
-            "the points whose interval is not yet: 'width(Guard.share) < 0.02'.",
-        ),
-    ] = None
-    target: Annotated[
-        str | None,
-        option(
-            "EXPR",
-            "Find the smallest value at which a mean reaches a target, and play only what that needs: 'Guard.share >= 0.95'. Up to "
-            "1,000 games of each point, or --runs.",
-        ),
-    ] = None
-    over: Annotated[str | None, over_option()] = None
-    directory: Annotated[
-        Path | None,
-        option(
-            "DIR",
-            "Batch directory; by default batches/NAME-HASH, the same for the same batch. Its finished runs are not repeated.",
-            "--out",
-        ),
-    ] = None
-    record_runs: Annotated[str | None, option("RUNS", "Record these runs in full: 417,3,10:20.")] = None
-    record_columns: Annotated[str | None, columns_option()] = None
-    scheduler: Annotated[str | None, option("ADDRESS", "Play on a Dask cluster: tcp://HOST:8786.")] = None
-    slurm: Annotated[str | None, option("N[,OPTION=VALUE...]", "Play in N Slurm jobs.")] = None
+    runs: int | None = option(
+        "N",
+        "Games of each point, that is of each set of varied values; by default as the sweep file says, or 100.",
+        "--runs",
+        "-n",
+        min=1,
+    )
+    sweep: Path | None = option("FILE", "A sweep file (TOML) or ranges file (XML) with the varied values.")
+    sample: str | None = option("METHOD", "Sampling method: lhs, sobol, saltelli, grid, list, product.")
+    samples: int | None = option("N", "Number of points to sample.", min=1)
+    sample_seed: int | None = option("N", "Seed of the sampling; by default 0.", min=0)
+    independent: bool = flag(
+        "--independent", "Each game has its own seed, instead of the same seeds at all points."
+    )
+    until: str | None = option(
+        "WIDTH",
+        "Stop when half of a 95 % interval is this narrow: 0.02 (share of wins of each team), 'score[2]:0.5'. Or play only "
+        "the points whose interval is not yet: 'width(Guard.share) < 0.02'.",
+    )
+    target: str | None = option(
+        "EXPR",
+        "Find the smallest value at which a mean reaches a target, and play only what that needs: 'Guard.share >= 0.95'. Up to "
+        "1,000 games of each point, or --runs.",
+    )
+    over: str | None = over_option()
+    directory: Path | None = option(
+        "DIR",
+        "Batch directory; by default batches/NAME-HASH, the same for the same batch. Its finished runs are not repeated.",
+        "--out",
+    )
+    record_runs: str | None = option("RUNS", "Record these runs in full: 417,3,10:20.")
+    record_columns: str | None = columns_option()
+    scheduler: str | None = option("ADDRESS", "Play on a Dask cluster: tcp://HOST:8786.")
+    slurm: str | None = option("N[,OPTION=VALUE...]", "Play in N Slurm jobs.")
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -131,45 +104,43 @@ class BatchOptions(ManyGamesOptions):
 class OptimizeOptions(ManyGamesOptions):
     """Search for the values with which a quantity of the game is greatest, or smallest."""
 
-    objective: Annotated[
-        str,
-        option(
-            "QUANTITY",
-            "Quantity whose mean over the games is maximized: 'score[3]-score[2]', 'wins[2]', 't'.",
-        ),
-    ] = ""
-    subject_to: Annotated[
-        list[str],
-        option(
-            "EXPR",
-            "Constraint that the mean over the games is to keep: 'lost[1] / start[1] < 0.2'. Can be repeated.",
-            "--subject-to",
-        ),
-    ] = field(default_factory=list)
-    minimize: Annotated[bool, flag("--minimize", "Minimize the quantity instead.")] = False
-    trials: Annotated[int, option("N", "Sets of values to try.", min=1, shows_default=True)] = 100
-    runs: Annotated[
-        int,
-        option(
-            "N", "Games of each trial, all with the same seeds.", "--runs", "-n", min=1, shows_default=True
-        ),
-    ] = 32
-    per_round: Annotated[
-        int, option("N", "Trials that are proposed and played together.", min=1, shows_default=True)
-    ] = 8
-    sampler: Annotated[
-        str,
-        option("NAME", "Sampler of Optuna that proposes the trials: tpe, cmaes, random.", shows_default=True),
-    ] = "tpe"
-    sample_seed: Annotated[int, option("N", "Seed of the sampler.", min=0, shows_default=True)] = 0
-    directory: Annotated[
-        Path | None,
-        option(
-            "DIR",
-            "Directory of the search; by default optimizations/NAME-HASH. The same command continues the search.",
-            "--out",
-        ),
-    ] = None
+    objective: str = option(
+        "QUANTITY",
+        "Quantity whose mean over the games is maximized: 'score[3]-score[2]', 'wins[2]', 't'.",
+        default="",
+    )
+    subject_to: list[str] = option(
+        "EXPR",
+        "Constraint that the mean over the games is to keep: 'lost[1] / start[1] < 0.2'. Can be repeated.",
+        "--subject-to",
+        default=list,
+    )
+    minimize: bool = flag("--minimize", "Minimize the quantity instead.")
+    trials: int = option("N", "Sets of values to try.", min=1, shows_default=True, default=100)
+    runs: int = option(
+        "N",
+        "Games of each trial, all with the same seeds.",
+        "--runs",
+        "-n",
+        min=1,
+        shows_default=True,
+        default=32,
+    )
+    per_round: int = option(
+        "N", "Trials that are proposed and played together.", min=1, shows_default=True, default=8
+    )
+    sampler: str = option(
+        "NAME",
+        "Sampler of Optuna that proposes the trials: tpe, cmaes, random.",
+        shows_default=True,
+        default="tpe",
+    )
+    sample_seed: int = option("N", "Seed of the sampler.", min=0, shows_default=True, default=0)
+    directory: Path | None = option(
+        "DIR",
+        "Directory of the search; by default optimizations/NAME-HASH. The same command continues the search.",
+        "--out",
+    )
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -183,91 +154,74 @@ class OptimizeOptions(ManyGamesOptions):
 class StressOptions(ManyGamesOptions):
     """Find how a mission fails: how often its games break a specification, how near the others come, and how rare failures are."""
 
-    spec: Annotated[
-        str,
-        option(
-            "SPEC",
-            "What must hold: 'always (distance(team 1, team 1) > 2 m)', 'lost[1] / start[1] < 0.2', or FILE.py:FUNCTION.",
-        ),
-    ] = ""
-    games: Annotated[int, option("N", "Games to play.", "--games", "-n", min=1, shows_default=True)] = 1000
-    against: Annotated[
-        str | None,
-        option(
-            "OTHER",
-            "Search for games that fail while the same game of another mission does not: a mission file, or NAME=VALUE[,NAME=VALUE].",
-        ),
-    ] = None
-    sampler: Annotated[
-        str, option("NAME", "With --vary: what proposes the values: cmaes, tpe, random.", shows_default=True)
-    ] = "cmaes"
-    sample_seed: Annotated[
-        int, option("N", "With --vary: seed of what proposes the values.", min=0, shows_default=True)
-    ] = 0
-    probability: Annotated[
-        bool, flag("--probability", "Estimate how likely a failure is, however rare, by games that branch.")
-    ] = False
-    importance: Annotated[
-        bool,
-        flag(
-            "--importance",
-            "With --probability and --vary NAME='normal(10, 2)', lognormal or uniform: importance sampling of these values.",
-        ),
-    ] = False
-    why: Annotated[
-        bool,
-        flag(
-            "--why",
-            "Show why and when the worst failing game was lost: what undoes the failure, by branches of it.",
-        ),
-    ] = False
-    shrink: Annotated[
-        bool,
-        flag("--shrink", "Make the worst failing game as small as it can be, as failures/smallest.xml."),
-    ] = False
-    guide: Annotated[
-        str,
-        option(
-            "SPEC",
-            "With --probability: what games break on their way to a failure: 'always (approach(all, all, 1 m/s) > 1 m)'.",
-        ),
-    ] = ""
-    redraws: Annotated[
-        int,
-        option(
-            "N",
-            "With --probability, where much is decided at the start: how often, at some levels, each game is tried with another start.",
-            min=0,
-            shows_default=True,
-        ),
-    ] = 0
-    particles: Annotated[
-        int,
-        option("N", "With --probability: games at a time, of each repetition.", min=2, shows_default=True),
-    ] = 100
-    repetitions: Annotated[
-        int, option("N", "With --probability: independent repetitions.", min=2, shows_default=True)
-    ] = 20
-    directory: Annotated[
-        Path | None,
-        option(
-            "DIR",
-            "Directory of the study; by default stress/NAME-HASH. The same command continues it.",
-            "--out",
-        ),
-    ] = None
+    spec: str = option(
+        "SPEC",
+        "What must hold: 'always (distance(team 1, team 1) > 2 m)', 'lost[1] / start[1] < 0.2', or FILE.py:FUNCTION.",
+        default="",
+    )
+    games: int = option("N", "Games to play.", "--games", "-n", min=1, shows_default=True, default=1000)
+    against: str | None = option(
+        "OTHER",
+        "Search for games that fail while the same game of another mission does not: a mission file, or NAME=VALUE[,NAME=VALUE].",
+    )
+    sampler: str = option(
+        "NAME",
+        "With --vary: what proposes the values: cmaes, tpe, random.",
+        shows_default=True,
+        default="cmaes",
+    )
+    sample_seed: int = option(
+        "N", "With --vary: seed of what proposes the values.", min=0, shows_default=True, default=0
+    )
+    probability: bool = flag(
+        "--probability", "Estimate how likely a failure is, however rare, by games that branch."
+    )
+    importance: bool = flag(
+        "--importance",
+        "With --probability and --vary NAME='normal(10, 2)', lognormal or uniform: importance sampling of these values.",
+    )
+    why: bool = flag(
+        "--why",
+        "Show why and when the worst failing game was lost: what undoes the failure, by branches of it.",
+    )
+    shrink: bool = flag(
+        "--shrink", "Make the worst failing game as small as it can be, as failures/smallest.xml."
+    )
+    guide: str = option(
+        "SPEC",
+        "With --probability: what games break on their way to a failure: 'always (approach(all, all, 1 m/s) > 1 m)'.",
+        default="",
+    )
+    redraws: int = option(
+        "N",
+        "With --probability, where much is decided at the start: how often, at some levels, each game is tried with another start.",
+        min=0,
+        shows_default=True,
+        default=0,
+    )
+    particles: int = option(
+        "N",
+        "With --probability: games at a time, of each repetition.",
+        min=2,
+        shows_default=True,
+        default=100,
+    )
+    repetitions: int = option(
+        "N", "With --probability: independent repetitions.", min=2, shows_default=True, default=20
+    )
+    directory: Path | None = option(
+        "DIR",
+        "Directory of the study; by default stress/NAME-HASH. The same command continues it.",
+        "--out",
+    )
 
-    holds: Annotated[
-        float | None,
-        option(
-            "P",
-            "End with exit code 6 unless the specification holds with 95 % confidence above this probability: 0.999.",
-        ),
-    ] = None
-    junit: Annotated[
-        Path | None,
-        option("FILE", "With --holds: write the answer as JUnit XML, for programs that run checks."),
-    ] = None
+    holds: float | None = option(
+        "P",
+        "End with exit code 6 unless the specification holds with 95 % confidence above this probability: 0.999.",
+    )
+    junit: Path | None = option(
+        "FILE", "With --holds: write the answer as JUnit XML, for programs that run checks."
+    )
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -303,62 +257,46 @@ class StressOptions(ManyGamesOptions):
 class AnalyzeOptions:
     """Show who won a batch and how sure that is, how points differ, and which variables matter; of runs, their results and orders."""
 
-    directories: Annotated[
-        list[Path],
-        argument(
-            "BATCH|RUN",
-            "A batch directory, complete or not; a run directory; or several runs, or folders of runs, whose operators are compared.",
-        ),
-    ]
-    quantities: Annotated[
-        list[str],
-        option(
-            "EXPR",
-            "Analyze this quantity: score[2], lost[1]/start[1], wins[2]-wins[3], t. Can be repeated; "
-            "by default the scores, the entities left of each team, and the time at the end.",
-            "--quantity",
-        ),
-    ] = field(default_factory=list)
-    compare: Annotated[
-        tuple[str, str] | None,
-        option(
-            "A B", "Compare, paired by seed, points with these numbers or values: tactic=keep tactic=switch."
-        ),
-    ] = None
-    target: Annotated[
-        str | None,
-        option(
-            "EXPR",
-            "Show from which value on a mean reaches a target, for each choice, and which further runs would narrow it: "
-            "'Guard.share >= 0.95'; by default the target of the command that played the batch.",
-        ),
-    ] = None
-    over: Annotated[str | None, over_option()] = None
-    by_point: Annotated[bool, flag("--by-point", "Show all points, not only twenty.")] = False
-    as_json: Annotated[bool, flag("--json", "Print everything as JSON.")] = False
+    directories: list[Path] = argument(
+        "BATCH|RUN",
+        "A batch directory, complete or not; a run directory; or several runs, or folders of runs, whose operators are compared.",
+    )
+    quantities: list[str] = option(
+        "EXPR",
+        "Analyze this quantity: score[2], lost[1]/start[1], wins[2]-wins[3], t. Can be repeated; "
+        "by default the scores, the entities left of each team, and the time at the end.",
+        "--quantity",
+        default=list,
+    )
+    compare: tuple[str, str] | None = option(
+        "A B", "Compare, paired by seed, points with these numbers or values: tactic=keep tactic=switch."
+    )
+    target: str | None = option(
+        "EXPR",
+        "Show from which value on a mean reaches a target, for each choice, and which further runs would narrow it: "
+        "'Guard.share >= 0.95'; by default the target of the command that played the batch.",
+    )
+    over: str | None = over_option()
+    by_point: bool = flag("--by-point", "Show all points, not only twenty.")
+    as_json: bool = flag("--json", "Print everything as JSON.")
 
 
 @dataclass(frozen=True, kw_only=True)
 class ReportOptions:
     """Write a page with the results of a batch: who won, what the varied values do, with plots as SVG and PNG."""
 
-    batch: Annotated[Path, argument("BATCH", "A batch directory, complete or not.")]
-    directory: Annotated[
-        Path | None, option("DIR", "Directory for the page and its plots; by default BATCH/report.", "--out")
-    ] = None
-    quantities: Annotated[
-        list[str],
-        option(
-            "EXPR",
-            "A quantity that gets its own plots, such as 'score[2]-score[3]' or t. Can be repeated.",
-            "--quantity",
-        ),
-    ] = field(default_factory=list)
-    target: Annotated[
-        str | None,
-        option(
-            "EXPR",
-            "Open with the answer to this question, as of tussle analyze; by default that of the command that played the batch.",
-        ),
-    ] = None
-    over: Annotated[str | None, over_option()] = None
+    batch: Path = argument("BATCH", "A batch directory, complete or not.")
+    directory: Path | None = option(
+        "DIR", "Directory for the page and its plots; by default BATCH/report.", "--out"
+    )
+    quantities: list[str] = option(
+        "EXPR",
+        "A quantity that gets its own plots, such as 'score[2]-score[3]' or t. Can be repeated.",
+        "--quantity",
+        default=list,
+    )
+    target: str | None = option(
+        "EXPR",
+        "Open with the answer to this question, as of tussle analyze; by default that of the command that played the batch.",
+    )
+    over: str | None = over_option()

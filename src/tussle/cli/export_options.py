@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import typer
 
@@ -78,58 +78,48 @@ def _output(name: str, what: str) -> Any:
 class ExportOptions(MapOptions, PluginOptions, RecordedAlarmOptions):
     """Convert a recorded run to a web page, film, image or tables; several outputs at once are possible."""
 
-    run: Annotated[Path, argument("RUN", "A run directory, complete or not.")]
-    other: Annotated[Path | None, argument("[RUN2]", "With --html, another run beside the first.")] = None
-    over: Annotated[bool, flag("--over", "Draw two runs in one place, not next to each other.")] = False
-    html: Annotated[Path | None, _output("html", "A web page that replays the run offline.")] = None
-    mp4: Annotated[Path | None, _output("mp4", "A film (H.264).")] = None
-    gif: Annotated[Path | None, _output("gif", "A small animation.")] = None
-    png: Annotated[Path | None, _output("png", "One image.")] = None
-    mcap: Annotated[Path | None, _output("mcap", "A log for Foxglove.")] = None
-    rerun: Annotated[Path | None, _output("rerun", "A recording for Rerun.")] = None
-    rosbag2: Annotated[Path | None, _output("rosbag2", "A folder for ros2 bag.")] = None
-    geojson: Annotated[Path | None, _output("geojson", "Tracks and areas by latitude and longitude.")] = None
-    kml: Annotated[Path | None, _output("kml", "The same with times, for Google Earth.")] = None
-    czml: Annotated[Path | None, _output("czml", "The same with times, for Cesium.")] = None
-    csv: Annotated[Path | None, _output("csv", "Tables of states and events.")] = None
-    parquet: Annotated[Path | None, _output("parquet", "The same tables, compressed.")] = None
-    world: Annotated[int | None, option("N", "World of a stack; by default 0, for tables all.", min=0)] = None
-    camera: Annotated[
-        str | None,
-        option(
-            "overview|top|follow",
-            "Camera of films and images: all entities from the south, from above, or behind one entity; by default overview.",
-        ),
-    ] = None
-    follow: Annotated[int | None, option("ID", "Follow this entity.")] = None
-    start: Annotated[str | None, option("TIME", "Start time of a film: 60, or '2 min'.", "--from")] = None
-    stop: Annotated[str | None, option("TIME", "End time of a film.", "--to")] = None
-    at: Annotated[str | None, option("TIME", "Time of the image; by default the middle.")] = None
-    speed: Annotated[
-        float | None,
-        option("X", "Simulated seconds per second of film; by default the film lasts at most 30 s."),
-    ] = None
-    fps: Annotated[float | None, option("N", "Frames per second; by default 25.")] = None
-    size: Annotated[str | None, option("WIDTHxHEIGHT", "Size of films and images; by default 1280x720.")] = (
-        None
+    run: Path = argument("RUN", "A run directory, complete or not.")
+    other: Path | None = argument("[RUN2]", "With --html, another run beside the first.", default=None)
+    over: bool = flag("--over", "Draw two runs in one place, not next to each other.")
+    html: Path | None = _output("html", "A web page that replays the run offline.")
+    mp4: Path | None = _output("mp4", "A film (H.264).")
+    gif: Path | None = _output("gif", "A small animation.")
+    png: Path | None = _output("png", "One image.")
+    mcap: Path | None = _output("mcap", "A log for Foxglove.")
+    rerun: Path | None = _output("rerun", "A recording for Rerun.")
+    rosbag2: Path | None = _output("rosbag2", "A folder for ros2 bag.")
+    geojson: Path | None = _output("geojson", "Tracks and areas by latitude and longitude.")
+    kml: Path | None = _output("kml", "The same with times, for Google Earth.")
+    czml: Path | None = _output("czml", "The same with times, for Cesium.")
+    csv: Path | None = _output("csv", "Tables of states and events.")
+    parquet: Path | None = _output("parquet", "The same tables, compressed.")
+    world: int | None = option("N", "World of a stack; by default 0, for tables all.", min=0)
+    camera: str | None = option(
+        "overview|top|follow",
+        "Camera of films and images: all entities from the south, from above, or behind one entity; by default overview.",
     )
-    trails: Annotated[float | None, option("S", "Duration of the trails [s]; 0 for none.")] = None
-    labels: Annotated[bool, flag("--labels", "Show the ids of the entities.")] = False
-    no_caption: Annotated[bool, flag("--no-caption", "Show no caption on films and images.")] = False
-    zoom: Annotated[float | None, option("X", "Zoom factor.")] = None
-    scale: Annotated[float | None, option("X", "Factor on the size of the models.")] = None
-    period: Annotated[
-        float | None,
-        option("S", "Time between the states, except in tables and films [s]; by default all states."),
-    ] = None
-    epoch: Annotated[
-        str | None,
-        option("DATE", "Date and time of t = 0 in --kml and --czml; by default 2000-01-01T00:00:00Z."),
-    ] = None
+    follow: int | None = option("ID", "Follow this entity.")
+    start: str | None = option("TIME", "Start time of a film: 60, or '2 min'.", "--from")
+    stop: str | None = option("TIME", "End time of a film.", "--to")
+    at: str | None = option("TIME", "Time of the image; by default the middle.")
+    speed: float | None = option(
+        "X", "Simulated seconds per second of film; by default the film lasts at most 30 s."
+    )
+    fps: float | None = option("N", "Frames per second; by default 25.")
+    size: str | None = option("WIDTHxHEIGHT", "Size of films and images; by default 1280x720.")
+    trails: float | None = option("S", "Duration of the trails [s]; 0 for none.")
+    labels: bool = flag("--labels", "Show the ids of the entities.")
+    no_caption: bool = flag("--no-caption", "Show no caption on films and images.")
+    zoom: float | None = option("X", "Zoom factor.")
+    scale: float | None = option("X", "Factor on the size of the models.")
+    period: float | None = option(
+        "S", "Time between the states, except in tables and films [s]; by default all states."
+    )
+    epoch: str | None = option(
+        "DATE", "Date and time of t = 0 in --kml and --czml; by default 2000-01-01T00:00:00Z."
+    )
 
-    storage: Annotated[str | None, option("mcap|sqlite3", "File format of --rosbag2; by default mcap.")] = (
-        None
-    )
+    storage: str | None = option("mcap|sqlite3", "File format of --rosbag2; by default mcap.")
 
     def __post_init__(self) -> None:
         if not self.files:
@@ -164,45 +154,31 @@ def _listed(names: Iterable[str], separator: str) -> str:
 class PlotOptions(PluginOptions):
     """Plot a recorded run: trajectories, speed, altitude, entities left, captures, density; columns also of several runs or a batch."""
 
-    run: Annotated[
-        Path,
-        argument("RUN", "A run directory, complete or not; with --column also a batch with recorded runs."),
-    ]
-    others: Annotated[
-        list[Path] | None,
-        argument("[RUN]...", "Further runs or batches, whose columns are compared with the first."),
-    ] = None
-    kinds: Annotated[
-        list[str],
-        option(
-            "KIND",
-            "trajectory, trajectory3d, speed, altitude, left, captures, density or distance; by default all that have data. "
-            "Can be repeated.",
-            "--kind",
-        ),
-    ] = field(default_factory=list)
-    columns: Annotated[
-        list[str],
-        option(
-            "NAME",
-            "Plot this column over time: one of a plugin that was recorded, such as Boids.goal or Boids.goal.x, or x, y, z, vx, vy, vz, "
-            "qw, qx, qy, qz, health. Can be repeated.",
-            "--column",
-        ),
-    ] = field(default_factory=list)
-    between: Annotated[
-        tuple[int, int] | None, option("ID ID", "Plot the distance between these two entities.")
-    ] = None
-    teams: Annotated[list[int], option("N", "Only this team. Can be repeated.", "--team")] = field(
-        default_factory=list
+    run: Path = argument(
+        "RUN", "A run directory, complete or not; with --column also a batch with recorded runs."
     )
-    entities: Annotated[list[int], option("ID", "Only this entity. Can be repeated.", "--entity")] = field(
-        default_factory=list
+    others: list[Path] | None = argument(
+        "[RUN]...", "Further runs or batches, whose columns are compared with the first.", default=None
     )
-    start: Annotated[str | None, option("TIME", "Start at this time: 60, or '2 min'.", "--from")] = None
-    stop: Annotated[str | None, option("TIME", "End at this time.", "--to")] = None
-    world: Annotated[int, option("N", "World of a stack.", min=0, shows_default=True)] = 0
-    form: Annotated[str, option("png|svg|pdf", "File format.", "--format", shows_default=True)] = "png"
-    directory: Annotated[
-        Path | None, option("DIR", "Directory for the plots; by default RUN/plots.", "--out")
-    ] = None
+    kinds: list[str] = option(
+        "KIND",
+        "trajectory, trajectory3d, speed, altitude, left, captures, density or distance; by default all that have data. "
+        "Can be repeated.",
+        "--kind",
+        default=list,
+    )
+    columns: list[str] = option(
+        "NAME",
+        "Plot this column over time: one of a plugin that was recorded, such as Boids.goal or Boids.goal.x, or x, y, z, vx, vy, vz, "
+        "qw, qx, qy, qz, health. Can be repeated.",
+        "--column",
+        default=list,
+    )
+    between: tuple[int, int] | None = option("ID ID", "Plot the distance between these two entities.")
+    teams: list[int] = option("N", "Only this team. Can be repeated.", "--team", default=list)
+    entities: list[int] = option("ID", "Only this entity. Can be repeated.", "--entity", default=list)
+    start: str | None = option("TIME", "Start at this time: 60, or '2 min'.", "--from")
+    stop: str | None = option("TIME", "End at this time.", "--to")
+    world: int = option("N", "World of a stack.", min=0, shows_default=True, default=0)
+    form: str = option("png|svg|pdf", "File format.", "--format", shows_default=True, default="png")
+    directory: Path | None = option("DIR", "Directory for the plots; by default RUN/plots.", "--out")

@@ -28,14 +28,18 @@ RENAMED = {"--log": "--record-runs"}
 """Former names of options."""
 
 
-def argument(metavar: str, text: str, **more: Any) -> Any:
-    """A positional argument."""
-    return typer.Argument(metavar=metavar, help=text, show_default=False, **more)
+def argument(metavar: str, text: str, default: Any = ..., **more: Any) -> Any:
+    """A positional argument, as a field of options."""
+    return _field(typer.Argument(metavar=metavar, help=text, show_default=False, **more), default)
 
 
-def option(metavar: str | None, text: str, *names: str, shows_default: bool = False, **more: Any) -> Any:
-    """An option with a value; its name is that of the field where `names` is empty."""
-    return typer.Option(*names, metavar=metavar, help=text, show_default=shows_default, **more)
+def option(
+    metavar: str | None, text: str, *names: str, default: Any = None, shows_default: bool = False, **more: Any
+) -> Any:
+    """An option with a value, as a field of options; its name is that of the field where `names` is empty."""
+    return _field(
+        typer.Option(*names, metavar=metavar, help=text, show_default=shows_default, **more), default
+    )
 
 
 def columns_option() -> Any:
@@ -55,8 +59,16 @@ def over_option() -> Any:
 
 
 def flag(name: str, text: str) -> Any:
-    """An option without a value."""
-    return typer.Option(name, help=text)
+    """An option without a value, as a field of options."""
+    return _field(typer.Option(name, help=text), False)
+
+
+def _field(declared: Any, default: Any) -> Any:
+    """A field with what `add_command` declares. As defaults, ... makes it required, and `list` stands for an empty list."""
+    of_default = (
+        {"default_factory": list} if default is list else {} if default is ... else {"default": default}
+    )
+    return field(metadata={"declared": declared}, **of_default)
 
 
 class TussleCommand(TyperCommand):
@@ -116,7 +128,7 @@ def add_command(
             exit code, or None for success.
         cls: Parses the command line.
     """
-    hints = get_type_hints(options, include_extras=True)
+    hints = get_type_hints(options)
     # Own options come first, then those of the base classes.
     declared = {
         key: place
@@ -124,10 +136,15 @@ def add_command(
         for key in vars(base).get("__annotations__", ())
     }
     parameters = [
-        Parameter(f.name, Parameter.KEYWORD_ONLY, default=_default(f), annotation=hints[f.name])
+        Parameter(
+            f.name,
+            Parameter.KEYWORD_ONLY,
+            default=_default(f),
+            annotation=Annotated[hints[f.name], f.metadata["declared"]],
+        )
         for f in sorted(fields(options), key=lambda f: declared[f.name])
     ]
-    debug = Annotated[bool, flag("--debug", "Show the traceback of an error.")]
+    debug = Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")]
 
     def call(*, debug: bool, **given: Any) -> None:
         with reported(debug):
@@ -195,27 +212,23 @@ def read_time(name: str, text: str) -> float:
 class PluginOptions:
     """List all plugins: those of tussle, of other packages, and of your files."""
 
-    plugin_files: Annotated[
-        list[Path], option("FILE", "A Python file with plugins. Can be repeated.", "--plugin-path")
-    ] = field(default_factory=list)
+    plugin_files: list[Path] = option(
+        "FILE", "A Python file with plugins. Can be repeated.", "--plugin-path", default=list
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
 class MapOptions:
     """A map on the ground of pictures."""
 
-    map_file: Annotated[
-        Path | None,
-        option(
-            "FILE",
-            "Show this map on the ground: GeoTIFF, MBTiles, PMTiles, or PNG or JPEG with --map-bounds. The mission needs an origin.",
-            "--map",
-        ),
-    ] = None
-    map_bounds: Annotated[
-        str | None,
-        option("W,S,E,N", "Edges of the map in degrees: west, south, east, north.", "--map-bounds"),
-    ] = None
+    map_file: Path | None = option(
+        "FILE",
+        "Show this map on the ground: GeoTIFF, MBTiles, PMTiles, or PNG or JPEG with --map-bounds. The mission needs an origin.",
+        "--map",
+    )
+    map_bounds: str | None = option(
+        "W,S,E,N", "Edges of the map in degrees: west, south, east, north.", "--map-bounds"
+    )
 
     @property
     def ground_map(self) -> GroundMap | None:
@@ -238,56 +251,44 @@ class MapOptions:
 class MissionOptions(PluginOptions):
     """Check a mission, or all of a folder: read it, build its game, report all errors. Of a run or batch directory, report all damage."""
 
-    mission: Annotated[
-        str,
-        argument(
-            "MISSION",
-            "A mission file, a built-in mission, or a plugin, for its example.",
-            autocompletion=completion.missions,
-        ),
-    ]
-    more: Annotated[
-        list[str], argument("NAME=VALUE", "Same as --set.", autocompletion=completion.settings)
-    ] = field(default_factory=list)
-    seed: Annotated[
-        int | None,
-        option("N", "Seed of the game; by default that of the mission, or 1.", min=0, max=MAX_SEED),
-    ] = None
-    settings: Annotated[
-        list[str],
-        option(
-            "NAME=VALUE",
-            "Set a variable ${name=default} of the mission, or any value by its path: prey.Boids.max_speed='50 kt', "
-            "prey.motion_model=SimpleAircraft, run.dt=0.05. Can be repeated.",
-            "--set",
-            autocompletion=completion.settings,
-        ),
-    ] = field(default_factory=list)
-    end: Annotated[str | None, option("TIME", "End the game at this time: 60, or '2 min'.")] = None
-    strict: Annotated[
-        bool | None,
-        typer.Option(
-            "--strict/--lenient",
-            help="Treat unknown tags and attributes of the mission as errors, or ignore them; by default they are errors, "
-            "except in missions that were written for SCRIMMAGE.",
-            show_default=False,
-        ),
-    ] = None
-    allow_large: Annotated[bool, flag("--allow-large", "Lift the limits on the size of a mission.")] = False
-    compat: Annotated[
-        str | None,
-        option("LAWS", "Play by other laws than tussle's: scrimmage, for SCRIMMAGE's own where they differ."),
-    ] = None
+    mission: str = argument(
+        "MISSION",
+        "A mission file, a built-in mission, or a plugin, for its example.",
+        autocompletion=completion.missions,
+    )
+    more: list[str] = argument(
+        "NAME=VALUE", "Same as --set.", autocompletion=completion.settings, default=list
+    )
+    seed: int | None = option(
+        "N", "Seed of the game; by default that of the mission, or 1.", min=0, max=MAX_SEED
+    )
+    settings: list[str] = option(
+        "NAME=VALUE",
+        "Set a variable ${name=default} of the mission, or any value by its path: prey.Boids.max_speed='50 kt', "
+        "prey.motion_model=SimpleAircraft, run.dt=0.05. Can be repeated.",
+        "--set",
+        autocompletion=completion.settings,
+        default=list,
+    )
+    end: str | None = option("TIME", "End the game at this time: 60, or '2 min'.")
+    strict: bool | None = option(
+        None,
+        "Treat unknown tags and attributes of the mission as errors, or ignore them; by default they are errors, "
+        "except in missions that were written for SCRIMMAGE.",
+        "--strict/--lenient",
+    )
+    allow_large: bool = flag("--allow-large", "Lift the limits on the size of a mission.")
+    compat: str | None = option(
+        "LAWS", "Play by other laws than tussle's: scrimmage, for SCRIMMAGE's own where they differ."
+    )
 
-    data_path: Annotated[
-        list[Path],
-        option(
-            "DIR",
-            "A folder of data, such as SCRIMMAGE's: aircraft, scripts, maps, terrains that the mission names. Can be repeated; "
-            "SCRIMMAGE_DATA_PATH names further ones.",
-            "--data-path",
-        ),
-    ] = field(default_factory=list)
+    data_path: list[Path] = option(
+        "DIR",
+        "A folder of data, such as SCRIMMAGE's: aircraft, scripts, maps, terrains that the mission names. Can be repeated; "
+        "SCRIMMAGE_DATA_PATH names further ones.",
+        "--data-path",
+        default=list,
+    )
 
     def __post_init__(self) -> None:
         read_settings([*self.settings, *self.more])

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
 
 import typer
 
@@ -32,24 +31,18 @@ MAX_MARK = 200
 class AgainOptions(MissionOptions):
     """A mission, or a game that was played before."""
 
-    mission: Annotated[
-        str,
-        argument(
-            "MISSION",
-            "A mission file, a built-in mission, or a plugin, for its example.",
-            autocompletion=completion.missions,
-        ),
-    ] = ""
-    from_batch: Annotated[
-        str | None,
-        option(
-            "BATCH:RUN", "Play a run of a batch, or a run directory, again instead of a mission.", "--from"
-        ),
-    ] = None
-    trust: Annotated[
-        bool,
-        flag("--trust", "With --from: run the plugin code of a batch or run directory made by someone else."),
-    ] = False
+    mission: str = argument(
+        "MISSION",
+        "A mission file, a built-in mission, or a plugin, for its example.",
+        autocompletion=completion.missions,
+        default="",
+    )
+    from_batch: str | None = option(
+        "BATCH:RUN", "Play a run of a batch, or a run directory, again instead of a mission.", "--from"
+    )
+    trust: bool = flag(
+        "--trust", "With --from: run the plugin code of a batch or run directory made by someone else."
+    )
 
     def __post_init__(self) -> None:
         is_changed = self.mission or self.more or self.settings or self.plugin_files
@@ -69,26 +62,18 @@ class AgainOptions(MissionOptions):
 class RunOptions(AgainOptions):
     """Play one game, record it, and show its result."""
 
-    directory: Annotated[
-        Path | None, option("DIR", "Run directory; by default runs/NAME-SEED-TIMESTAMP.", "--out")
-    ] = None
-    no_log: Annotated[bool, flag("--no-log", "Record nothing.")] = False
-    log_period: Annotated[
-        float | None, option("S", "Time between recorded states [s]; by default every step.")
-    ] = None
-    shapes: Annotated[bool, flag("--shapes", "Record the shapes that plugins draw, too.")] = False
-    record_columns: Annotated[str | None, columns_option()] = None
-    results: Annotated[
-        bool, flag("--results", "Record scores and results after each step, too, for curves in replays.")
-    ] = False
-    pace: Annotated[
-        float | None,
-        option("X", "Play at most X times as fast as real time. The result does not change."),
-    ] = None
-    start_from: Annotated[
-        Path | None,
-        option("TABLE", "Take ids, spawn times and initial states from a recorded trajectory."),
-    ] = None
+    directory: Path | None = option("DIR", "Run directory; by default runs/NAME-SEED-TIMESTAMP.", "--out")
+    no_log: bool = flag("--no-log", "Record nothing.")
+    log_period: float | None = option("S", "Time between recorded states [s]; by default every step.")
+    shapes: bool = flag("--shapes", "Record the shapes that plugins draw, too.")
+    record_columns: str | None = columns_option()
+    results: bool = flag(
+        "--results", "Record scores and results after each step, too, for curves in replays."
+    )
+    pace: float | None = option("X", "Play at most X times as fast as real time. The result does not change.")
+    start_from: Path | None = option(
+        "TABLE", "Take ids, spawn times and initial states from a recorded trajectory."
+    )
 
     def __post_init__(self) -> None:
         recorded = (
@@ -110,17 +95,12 @@ class RunOptions(AgainOptions):
 class DescribeOptions(MissionOptions):
     """Show the parameters and channels of a plugin, or the entities and the step schedule of a mission."""
 
-    mission: Annotated[
-        str,
-        argument(
-            "MISSION|PLUGIN",
-            "A mission file, a built-in mission, or a plugin.",
-            autocompletion=completion.plugins,
-        ),
-    ]
-    example: Annotated[bool, flag("--example", "Print the mission file that shows what a plugin does.")] = (
-        False
+    mission: str = argument(
+        "MISSION|PLUGIN",
+        "A mission file, a built-in mission, or a plugin.",
+        autocompletion=completion.plugins,
     )
+    example: bool = flag("--example", "Print the mission file that shows what a plugin does.")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -142,7 +122,7 @@ class SchemaOptions(PluginOptions):
 class ConvertOptions(MissionOptions):
     """Write a mission with all its values as one mission file, or as the Python code that builds it."""
 
-    to: Annotated[Path, option("FILE", "The file to write: NAME.xml or NAME.py.")]
+    to: Path = option("FILE", "The file to write: NAME.xml or NAME.py.", default=...)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -156,43 +136,31 @@ class ConvertOptions(MissionOptions):
 class NewOptions:
     """Write a working plugin, its test, and a mission that uses it."""
 
-    kind: Annotated[
-        str, argument("KIND", "autonomy, motion, controller, sensor, interaction, metric or network.")
-    ]
-    name: Annotated[str, argument("NAME", "Class name, such as MyBoids.")]
-    origin: Annotated[
-        str | None,
-        option(
-            "STOCK",
-            "Start from a copy of this stock plugin.",
-            "--from",
-            autocompletion=completion.stock_plugins,
-        ),
-    ] = None
-    easy: Annotated[bool, flag("--easy", "Write code for one entity, or one world, at a time.")] = False
-    directory: Annotated[Path, option("DIR", "Directory for the files.", "--out", shows_default=True)] = (
-        Path()
+    kind: str = argument("KIND", "autonomy, motion, controller, sensor, interaction, metric or network.")
+    name: str = argument("NAME", "Class name, such as MyBoids.")
+    origin: str | None = option(
+        "STOCK",
+        "Start from a copy of this stock plugin.",
+        "--from",
+        autocompletion=completion.stock_plugins,
     )
+    easy: bool = flag("--easy", "Write code for one entity, or one world, at a time.")
+    directory: Path = option("DIR", "Directory for the files.", "--out", shows_default=True, default=Path())
 
 
 @dataclass(frozen=True, kw_only=True)
 class AlarmOptions:
     """Specifications that a page shows."""
 
-    spec: Annotated[
-        list[str],
-        option(
-            "SPEC",
-            "Show how far the game is from breaking this, and alarms: 'always (distance(team 1, team 1) > 2 m)'. Can be repeated.",
-        ),
-    ] = field(default_factory=list)
-    margin: Annotated[
-        float | None,
-        option(
-            "X",
-            "With --spec: alarm within this distance of failing, in the unit compared (SI); by default 1.",
-        ),
-    ] = None
+    spec: list[str] = option(
+        "SPEC",
+        "Show how far the game is from breaking this, and alarms: 'always (distance(team 1, team 1) > 2 m)'. Can be repeated.",
+        default=list,
+    )
+    margin: float | None = option(
+        "X",
+        "With --spec: alarm within this distance of failing, in the unit compared (SI); by default 1.",
+    )
 
     def check_alarms(self) -> None:
         """Check the options.
@@ -209,10 +177,11 @@ class AlarmOptions:
 class RecordedAlarmOptions(AlarmOptions):
     """Specifications and moments that the page of a recorded game shows."""
 
-    mark: Annotated[
-        list[str],
-        option("TIME=TEXT", "Mark this moment on the time line: '12.4=lost from here on'. Can be repeated."),
-    ] = field(default_factory=list)
+    mark: list[str] = option(
+        "TIME=TEXT",
+        "Mark this moment on the time line: '12.4=lost from here on'. Can be repeated.",
+        default=list,
+    )
 
     @property
     def marks(self) -> list[tuple[float, str]]:
@@ -249,26 +218,20 @@ def _mark(given: str) -> tuple[float, str]:
 class PageOptions(MapOptions, PluginOptions):
     """Options of the viewer page."""
 
-    pace: Annotated[
-        str | None,
-        option("X|max", "Play X times as fast as real time, or as fast as possible; by default 1."),
-    ] = None
-    paused: Annotated[bool, flag("--paused", "Do not start until told to on the page.")] = False
-    host: Annotated[
-        str,
-        option(
-            "ADDRESS",
-            "Serve the page at this address of the machine. At any but 127.0.0.1, others who have the whole URL can watch and steer.",
-            shows_default=True,
-        ),
-    ] = "127.0.0.1"
-    port: Annotated[
-        int | None,
-        option(
-            "N", "Serve the page at this port; by default the first free one from 8123.", min=1, max=65535
-        ),
-    ] = None
-    no_browser: Annotated[bool, flag("--no-browser", "Open no browser, only print the address.")] = False
+    pace: str | None = option(
+        "X|max", "Play X times as fast as real time, or as fast as possible; by default 1."
+    )
+    paused: bool = flag("--paused", "Do not start until told to on the page.")
+    host: str = option(
+        "ADDRESS",
+        "Serve the page at this address of the machine. At any but 127.0.0.1, others who have the whole URL can watch and steer.",
+        shows_default=True,
+        default="127.0.0.1",
+    )
+    port: int | None = option(
+        "N", "Serve the page at this port; by default the first free one from 8123.", min=1, max=65535
+    )
+    no_browser: bool = flag("--no-browser", "Open no browser, only print the address.")
 
     def __post_init__(self) -> None:
         if self.pace is None or self.pace == "max":
@@ -290,37 +253,23 @@ class PageOptions(MapOptions, PluginOptions):
 class ViewOptions(AgainOptions, PageOptions, AlarmOptions):
     """Play one game live on a page in the browser: pause it, step it, rewind it, follow entities."""
 
-    pace: Annotated[
-        str | None,
-        option(
-            "X|max",
-            "Play X times as fast as real time, or as fast as possible; by default as the mission says, or 1.",
-        ),
-    ] = None
-    record: Annotated[
-        Path | None, option("DIR", "Record the game into this directory, as tussle run does.")
-    ] = None
-    record_columns: Annotated[str | None, columns_option()] = None
-    roles: Annotated[
-        bool, flag("--roles", "Print further addresses: for watching only, and for orders to one team.")
-    ] = False
-    operator: Annotated[
-        list[str],
-        option(
-            "NAME=team N",
-            "Print an address for somebody who gives orders to a team; their orders have this name. Can be repeated.",
-        ),
-    ] = field(default_factory=list)
-    link: Annotated[
-        str | None,
-        option(
-            "delay=S,loss=P,bandwidth=B,see=S",
-            "Let orders come later [s], be lost with a probability, or share a bandwidth [bytes/s]; show the game later [s].",
-        ),
-    ] = None
-    exit_when_over: Annotated[bool, flag("--exit-when-over", "End with the game, not only by Ctrl-C.")] = (
-        False
+    pace: str | None = option(
+        "X|max",
+        "Play X times as fast as real time, or as fast as possible; by default as the mission says, or 1.",
     )
+    record: Path | None = option("DIR", "Record the game into this directory, as tussle run does.")
+    record_columns: str | None = columns_option()
+    roles: bool = flag("--roles", "Print further addresses: for watching only, and for orders to one team.")
+    operator: list[str] = option(
+        "NAME=team N",
+        "Print an address for somebody who gives orders to a team; their orders have this name. Can be repeated.",
+        default=list,
+    )
+    link: str | None = option(
+        "delay=S,loss=P,bandwidth=B,see=S",
+        "Let orders come later [s], be lost with a probability, or share a bandwidth [bytes/s]; show the game later [s].",
+    )
+    exit_when_over: bool = flag("--exit-when-over", "End with the game, not only by Ctrl-C.")
 
     def __post_init__(self) -> None:
         AgainOptions.__post_init__(self)
@@ -350,15 +299,18 @@ def _operator(text: str) -> tuple[str, int]:
 class ReplayOptions(PageOptions, RecordedAlarmOptions):
     """Play a recorded run on a page in the browser, or two runs from the moment at which they differ."""
 
-    run: Annotated[Path, argument("RUN", "A run directory, complete or not.")]
-    other: Annotated[
-        Path | None,
-        argument("RUN2", "Another run, shown beside the first from the moment at which they differ."),
-    ] = None
-    over: Annotated[
-        bool, typer.Option("--over/--side-by-side", help="Draw two runs in one place, or next to each other.")
-    ] = False
-    world: Annotated[int, option("N", "World of a stack.", min=0, shows_default=True)] = 0
+    run: Path = argument("RUN", "A run directory, complete or not.")
+    other: Path | None = argument(
+        "RUN2", "Another run, shown beside the first from the moment at which they differ.", default=None
+    )
+    over: bool = option(
+        None,
+        "Draw two runs in one place, or next to each other.",
+        "--over/--side-by-side",
+        shows_default=True,
+        default=False,
+    )
+    world: int = option("N", "World of a stack.", min=0, shows_default=True, default=0)
 
     def __post_init__(self) -> None:
         PageOptions.__post_init__(self)
@@ -371,21 +323,20 @@ class ReplayOptions(PageOptions, RecordedAlarmOptions):
 class ServeOptions(MissionOptions):
     """Serve a mission to programs in any language, which step it, read and write its columns, and publish messages."""
 
-    worlds: Annotated[
-        int,
-        option(
-            "N", "Number of worlds; they have the seeds that follow.", min=1, max=100_000, shows_default=True
-        ),
-    ] = 1
-    host: Annotated[
-        str,
-        option(
-            "ADDRESS",
-            "Serve at this address of the machine; at any but 127.0.0.1, others can connect.",
-            shows_default=True,
-        ),
-    ] = "127.0.0.1"
-    port: Annotated[
-        int | None,
-        option("N", "Serve at this port; by default the first free one from 8123.", min=1, max=65535),
-    ] = None
+    worlds: int = option(
+        "N",
+        "Number of worlds; they have the seeds that follow.",
+        min=1,
+        max=100_000,
+        shows_default=True,
+        default=1,
+    )
+    host: str = option(
+        "ADDRESS",
+        "Serve at this address of the machine; at any but 127.0.0.1, others can connect.",
+        shows_default=True,
+        default="127.0.0.1",
+    )
+    port: int | None = option(
+        "N", "Serve at this port; by default the first free one from 8123.", min=1, max=65535
+    )

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 from tussle.cli.interrupt import Interrupt
 from tussle.cli.options import check_positive, option, read_settings
@@ -16,15 +16,13 @@ from tussle.errors import MissionError
 class RosNodeOptions:
     """Run an autonomy in a node of ROS 1: each odom of a robot is answered with a cmd_vel, until Ctrl-C."""
 
-    plugin: Annotated[str, option("NAME|FILE", "An autonomy, or a Python file that defines one.")]
-    namespace: Annotated[str, option("NAME", "Namespace of odom and cmd_vel.", shows_default=True)] = (
-        "entity1"
+    plugin: str = option("NAME|FILE", "An autonomy, or a Python file that defines one.", default=...)
+    namespace: str = option("NAME", "Namespace of odom and cmd_vel.", shows_default=True, default="entity1")
+    dt: float = option("SECONDS", "Time between two odoms.", shows_default=True, default=0.1)
+    seed: int = option("N", "Seed of its random numbers.", min=0, shows_default=True, default=1)
+    settings: list[str] = option(
+        "NAME=VALUE", "Set a parameter of the autonomy. Can be repeated.", "--set", default=list
     )
-    dt: Annotated[float, option("SECONDS", "Time between two odoms.", shows_default=True)] = 0.1
-    seed: Annotated[int, option("N", "Seed of its random numbers.", min=0, shows_default=True)] = 1
-    settings: Annotated[
-        list[str], option("NAME=VALUE", "Set a parameter of the autonomy. Can be repeated.", "--set")
-    ] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         check_positive(dt=self.dt)

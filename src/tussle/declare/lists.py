@@ -9,7 +9,7 @@ import numpy as np
 
 from tussle.declare.columns import Numbers
 from tussle.errors import ParameterError
-from tussle.numeric import segments
+from tussle.numeric import arrays
 
 
 class Segments:
@@ -39,19 +39,19 @@ class Segments:
 
     def sum(self, values: Any) -> np.ndarray:
         """Sum over each row's items of values (m,) or (k, m): (n,) or (k, n), 0 for rows without items."""
-        return self._each(segments.segment_sum, values, float)
+        return self._each(arrays.segment_sum, values, float)
 
     def mean(self, values: Any) -> np.ndarray:
         """Mean over each row's items, 0 for rows without items."""
-        return self._each(segments.segment_mean, values, float, 0.0)
+        return self._each(arrays.segment_mean, values, float, 0.0)
 
     def min(self, values: Any) -> np.ndarray:
         """Minimum over each row's items, infinity for rows without items."""
-        return self._each(segments.segment_min, values, float, np.inf)
+        return self._each(arrays.segment_min, values, float, np.inf)
 
     def argmin(self, values: Any) -> np.ndarray:
         """Item with the smallest value in each row, (n,), the first of equal ones; -1 for rows without items."""
-        return self._each(segments.segment_first_min, values, np.int64)
+        return self._each(arrays.segment_first_min, values, np.int64)
 
 
 class RaggedColumn(Segments):

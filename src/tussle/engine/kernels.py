@@ -1,7 +1,5 @@
 """Kernels of births and removals: initial states of newborn entities, and moving of rows."""
 
-from __future__ import annotations
-
 import math
 
 from tussle.numeric import cos, sin

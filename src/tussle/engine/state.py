@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tussle.api.bodies import Bodies
-from tussle.api.clock import Clock
-from tussle.api.context import Context
+from tussle.api.context import Clock, Context
 from tussle.api.world import WorldView
 from tussle.engine.births import Births
 from tussle.engine.events import Listeners

@@ -28,8 +28,7 @@ from tussle.mission.rekeys import parse_rekeys
 from tussle.mission.scene_tags import SCENE_TAGS, SceneReader
 from tussle.mission.source import MissionSource, SourceReader, find_mission
 from tussle.mission.spec import MISSION_VALUES, Mission, end_conditions, read_from_file, too_early
-from tussle.mission.stray_tags import report_stray
-from tussle.mission.strictness import strictness_of
+from tussle.mission.strictness import report_stray, strictness_of
 from tussle.mission.tags import RUN, RUNSCRIPT, SEED_ATTRIBUTES, WORLD, TagSpec
 from tussle.world.geodesy import Origin
 from tussle.world.scene import Scene

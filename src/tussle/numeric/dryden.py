@@ -7,8 +7,6 @@ stationary state and F its transition (Van Loan 1978 for a stationary process).
 In compiled code the functions take and return components, in Python component-first arrays.
 """
 
-from __future__ import annotations
-
 import math
 
 from tussle.numeric.functions import exp, log

@@ -9,8 +9,6 @@ Rounding to an integer adds and subtracts 1.5 * 2**52. In round-to-nearest mode 
 no rounding instruction or conversion between float and int is needed; older CPUs have none for 64-bit lanes.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Closed forms of paths that motion models share."""
 
-from __future__ import annotations
-
 import math
 
 from tussle.numeric.elementary import sincos, wrap

@@ -1,7 +1,5 @@
 """One step of a PID law with an integral band, for controllers."""
 
-from __future__ import annotations
-
 import math
 
 from tussle.numeric.elementary import atan2, wrap

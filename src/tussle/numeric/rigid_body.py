@@ -4,8 +4,6 @@ Vectors are tuples of three numbers. The state of a body is (x, y, z, vx, vy, vz
 world frame; quaternion body to world; angular velocity [rad/s], body frame (forward, left, up).
 """
 
-from __future__ import annotations
-
 from tussle.numeric.kernel import device
 from tussle.numeric.quaternion import quat_rotate, quat_rotate_inverse
 

@@ -1,7 +1,5 @@
 """The closest point of a triangle."""
 
-from __future__ import annotations
-
 from tussle.numeric.kernel import device
 
 

@@ -3,8 +3,6 @@
 They compute, point by point, what `tussle.world.shapes` says for arrays, and skip what cannot change the result.
 """
 
-from __future__ import annotations
-
 import math
 
 from tussle.numeric.kernel import kernel, lean_device

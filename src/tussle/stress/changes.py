@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from tussle.api import Messages, Network, WorldView
-from tussle.api.timed_fault import TimedFault
+from tussle.api.channel_fault import TimedFault
 from tussle.mission import Block, Mission, paths
 from tussle.plugins import stock
 

@@ -11,8 +11,7 @@ from tussle.testing.declarations import check_declarations
 from tussle.testing.game import build
 from tussle.testing.limits import check_limits
 from tussle.testing.motion import check_motion
-from tussle.testing.stacks import check_kernels, check_reset, check_snapshot, check_stacks
-from tussle.testing.traces import Traces
+from tussle.testing.stacks import Traces, check_kernels, check_reset, check_snapshot, check_stacks
 from tussle.testing.watch import check_calls, check_class_values, class_values
 
 

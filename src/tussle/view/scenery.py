@@ -15,8 +15,7 @@ from tussle.mission import Block, GivenMission, Mission, mission_of
 from tussle.view.ground_map.map_file import GroundMap
 from tussle.view.ground_map.placed import Area
 from tussle.view.shapes import Mesh
-from tussle.view.solids import MAX_FACES, mesh_of, outline_of
-from tussle.view.terrain import Terrain
+from tussle.view.solids import MAX_FACES, Terrain, mesh_of, outline_of
 from tussle.world.geodesy import Origin
 from tussle.world.rays.surfaces import MeshPart
 from tussle.world.scene import (

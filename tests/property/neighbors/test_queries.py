@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from neighbor_stacks import stack
 
+from tussle.numeric.arrays import segment_first_min, segment_mean, segment_min, segment_sum
 from tussle.numeric.neighbors import nearest, pairs, search
-from tussle.numeric.segments import segment_first_min, segment_mean, segment_min, segment_sum
 
 RADIUS = 5.0
 QUICK = settings(max_examples=40, derandomize=True)

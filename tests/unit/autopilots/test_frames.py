@@ -13,7 +13,7 @@ from tussle import Block, Mission, Simulation
 from tussle.api import Input, MotionModel, Param, State
 from tussle.numeric.quaternion import quat_from_euler
 from tussle.plugins.links.autopilots.frames import to_frd, to_ned, to_ned_frd
-from tussle.plugins.stock.autonomy.px4.sensors import atmosphere, limited, to_body
+from tussle.plugins.stock.autonomy.px4.link import atmosphere, limited, to_body
 from tussle.stock import ArduPilot, DirectController
 
 G = 9.80665

@@ -14,8 +14,8 @@ from gambles import counted, game, rows
 from tussle import Simulation
 from tussle.api import Metric
 from tussle.batch import Batch, Choice, InProcess, Processes, Range, load_batch
-from tussle.batch.progress import Progress
 from tussle.batch.reload import planned_run
+from tussle.batch.tasks import Progress
 from tussle.errors import BatchError, MissionError, ParameterError, WiringError
 from tussle.mission import read_mission
 from tussle.stock import SingleIntegrator

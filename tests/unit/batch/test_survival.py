@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from made_batches import made_batch
 
 from tussle.batch.results import Results
-from tussle.batch.survival import survival_of
+from tussle.batch.run_table import survival_of
 from tussle.errors import ParameterError
 
 TIMES = np.linspace(0.0, 10.0, 41)

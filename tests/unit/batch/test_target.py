@@ -15,8 +15,8 @@ from tussle.batch.further import further_runs, without
 from tussle.batch.results import Results
 from tussle.batch.sampling import sample
 from tussle.batch.sequential import Question, Width, rule_of
+from tussle.batch.stopping import Until
 from tussle.batch.target import Target
-from tussle.batch.until import Until
 from tussle.errors import ParameterError
 
 TACTIC = Choice("tactic", ("lanes", "random"))

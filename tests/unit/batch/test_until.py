@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tussle.batch.statistics import wilson
-from tussle.batch.until import MIN_RUNS, Until
+from tussle.batch.stopping import MIN_RUNS, Until
 from tussle.errors import ParameterError
 
 

@@ -228,7 +228,7 @@ def test_an_error_of_the_server_is_told(actors, tmp_path, port):
 
 
 def test_a_server_that_is_not_there_is_named(tmp_path, port, monkeypatch):
-    monkeypatch.setattr("tussle.plugins.stock.autonomy.rl_simple.remote.TIMEOUT", 0.2)
+    monkeypatch.setattr("tussle.plugins.stock.autonomy.rl_simple.actors.TIMEOUT", 0.2)
     with (
         Simulation(robot(tmp_path, port)) as sim,
         pytest.raises(

@@ -10,8 +10,7 @@ from tussle.errors import ConformanceError, PluginError, WiringError
 from tussle.stock import AvoidEntityMS, MotorSchemas, NoisyContacts, Still
 from tussle.testing import check_plugin
 from tussle.testing.game import build
-from tussle.testing.stacks import check_reset, check_snapshot, check_stacks
-from tussle.testing.traces import Traces
+from tussle.testing.stacks import Traces, check_reset, check_snapshot, check_stacks
 from tussle.testing.watch import check_calls
 
 

@@ -224,7 +224,7 @@ def test_files_win_over_packages_and_these_over_what_ships_and_it_is_said_once(f
     def hides(loaded):
         return [note for note in loaded.notes if "hides" in note]
 
-    assert (origin(read()), hides(read())) == ("tussle.plugins.stock.autonomy.boids.plugin", [])
+    assert (origin(read()), hides(read())) == ("tussle.plugins.stock.autonomy.boids", [])
     distribution("flocks", Boids="my_flocks:Boids")
     boids("flocks/my_flocks.py")
     loaded = read()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from tussle.errors import MissionError
-from tussle.mission.repairs import repair
+from tussle.mission.node import repair
 
 MALFORMED = {
     "comment": ("<!-- run it --seed 3 -->", '"--" is inside a comment', "<!-- run it - -seed 3 -->"),

@@ -13,7 +13,7 @@ from tussle.mission import read_mission, to_python, to_xml
 from tussle.mission.node import Node
 from tussle.mission.paths import with_value
 from tussle.mission.problems import Place, Problems
-from tussle.mission.stray_tags import report_stray
+from tussle.mission.strictness import report_stray
 from tussle.mission.tags import WORLD, WORLD_MANY
 from tussle.scene import Base, Origin
 from tussle.stock import (

@@ -8,8 +8,7 @@ from six_degrees import Pilot, seen
 
 from tussle import Block, Mission, Simulation, stock
 from tussle.api import Autonomy, EntityRef, Output, Publish, Subscribe
-from tussle.api.channel_map import channel_rows
-from tussle.api.channels import CHANNEL_UNITS
+from tussle.api.channel_map import CHANNEL_UNITS, channel_rows
 from tussle.errors import ParameterError, WiringError
 from tussle.messages import ChargeAdded, ChargePercentage
 from tussle.stock import MotionBattery, Unicycle, UnicyclePID

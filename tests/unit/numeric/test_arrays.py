@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from tussle.numeric import clip
-from tussle.numeric.arrays import matmul, unit
-from tussle.numeric.segments import order_by_row
+from tussle.numeric.arrays import matmul, order_by_row, unit
 
 DRAW = np.random.default_rng(3)
 

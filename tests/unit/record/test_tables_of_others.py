@@ -13,7 +13,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from tussle.errors import ParameterError, RecordError
-from tussle.plugins.stock.autonomy.trajectory_record_playback.table import read_recorded
+from tussle.plugins.stock.autonomy.trajectory_record_playback import read_recorded
 from tussle.record.arrow_file import read_batches
 from tussle.record.first_states import read_table
 from tussle.record.parquet_file import read_parquet

@@ -80,7 +80,7 @@ def test_the_team_observes_the_direction_of_prey_and_earns_captures():
 def test_policies_of_either_side_play_where_all_learn():
     pytest.importorskip("onnxruntime", reason="onnxruntime is not installed: pip install 'tussle[policy]'")
     pytest.importorskip("onnx", reason="onnx is not installed: pip install 'tussle[policy]'")
-    from tussle.plugins.stock.autonomy.learned.plugin import policy_path
+    from tussle.plugins.stock.autonomy.learned import policy_path
     from tussle.rl.flight import Policy
 
     hunt, flee = Policy(policy_path("predator_team")), Policy(policy_path("prey_escape"))

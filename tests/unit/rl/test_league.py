@@ -13,7 +13,7 @@ from leagues import chase_league, constant
 
 from tussle.batch.executors import InProcess
 from tussle.errors import BatchError, ParameterError
-from tussle.plugins.stock.autonomy.learned.plugin import policy_path
+from tussle.plugins.stock.autonomy.learned import policy_path
 from tussle.rl import Battle
 from tussle.rl.flight import load_flight
 from tussle.rl.league import League, Pairing, ratings_of

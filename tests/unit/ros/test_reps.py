@@ -147,7 +147,7 @@ class Ros2:
 def ros_type(kind):
     """A message of ROS 1 by its name."""
     if kind == "mavros_msgs/Altitude":
-        from tussle.plugins.links.ros.altitude import altitude_type
+        from tussle.plugins.stock.sensor.ros_altimeter import altitude_type
 
         return altitude_type()
     return getattr(load_rospy(), kind.partition("/")[2])

@@ -24,10 +24,10 @@ from tussle.errors import MissingExtraError, ParameterError, PluginError, RosErr
 from tussle.mission import read_mission
 from tussle.plugins import stock
 from tussle.plugins.links.ros import link as ros_link
-from tussle.plugins.links.ros.altitude import altitude_type
 from tussle.plugins.links.ros.link import RosLink
 from tussle.plugins.links.ros.node import load_rospy
 from tussle.plugins.links.ros.steps import StepGate
+from tussle.plugins.stock.sensor.ros_altimeter import altitude_type
 from tussle.scene import FlatGround, Origin, Scene
 from tussle.stock import (
     External,

@@ -10,7 +10,7 @@ from test_radio_network import hears, is_near, n_heard, talks
 
 from tussle import Block, Mission, Simulation
 from tussle.api import Autonomy, Input, MotionModel, Output, Sensor, State
-from tussle.api.channels import CHANNEL_UNITS, MEASURED_CHANNELS, MEASURED_LISTS
+from tussle.api.channel_map import CHANNEL_UNITS, MEASURED_CHANNELS, MEASURED_LISTS
 from tussle.declare.units import split_units
 from tussle.errors import ParameterError, WiringError
 from tussle.plugins import stock

@@ -20,9 +20,9 @@ from tussle.view import series as series_module
 from tussle.view.curves import numbers_of
 from tussle.view.entity import entity_state
 from tussle.view.page.compare import Comparison
+from tussle.view.page.formatting import differing_settings
 from tussle.view.page.recorded import RecordedData
 from tussle.view.page.recorded_curves import COLUMNS, column_changes
-from tussle.view.page.settings import differing_settings
 from tussle.view.series import CurveName, StepSeries
 
 

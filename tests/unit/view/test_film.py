@@ -29,8 +29,7 @@ from tussle.view.export.film.renderer import Renderer, _delayed_interrupt, find_
 from tussle.view.export.film.trails import Trails
 from tussle.view.frame import Frame
 from tussle.view.scenery import Region, Scenery
-from tussle.view.solids import mesh_of, outline_of
-from tussle.view.terrain import Terrain
+from tussle.view.solids import Terrain, mesh_of, outline_of
 from tussle.world.geodesy import Origin
 
 SMALL = (64, 48)

@@ -19,7 +19,7 @@ from tussle.stock import Boids, Still, Unicycle
 from tussle.view import Recording
 from tussle.view.export.html import write_html
 from tussle.view.page.recorded import kept_frames
-from tussle.view.terrain import Terrain
+from tussle.view.solids import Terrain
 
 HOSTILE = "</script><script>alert(1)</script><!-- {{script}} '\"&amp;\u2028"
 

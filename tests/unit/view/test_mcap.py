@@ -19,8 +19,7 @@ from tussle.stock import Still
 from tussle.view import MODELS, Recording
 from tussle.view.export.mcap_file import default_scale, write_mcap
 from tussle.view.scenery import Region, Scenery
-from tussle.view.solids import mesh_of, outline_of
-from tussle.view.terrain import Terrain
+from tussle.view.solids import Terrain, mesh_of, outline_of
 from tussle.world.geodesy import Origin
 
 SECOND = 1_000_000_000

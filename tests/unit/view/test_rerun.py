@@ -16,8 +16,7 @@ from tussle.view import MODELS, Recording
 from tussle.view.export.mcap_file import default_scale
 from tussle.view.export.rerun_file import FRAMES_AT_ONCE, write_rerun
 from tussle.view.scenery import Region, Scenery
-from tussle.view.solids import mesh_of, outline_of
-from tussle.view.terrain import Terrain
+from tussle.view.solids import Terrain, mesh_of, outline_of
 from tussle.world.geodesy import Origin
 
 COLUMNS = "*.Boids.target,*.Predator.target"

@@ -6,7 +6,7 @@ import pytest
 from tussle import Recorder, Simulation
 from tussle.mission import read_mission
 from tussle.view import Live, Recording
-from tussle.view.terrain import MAX_DRAWN, Terrain
+from tussle.view.solids import MAX_DRAWN, Terrain
 from tussle.world.rays.files import read_surface
 
 GRID = """ncols 3

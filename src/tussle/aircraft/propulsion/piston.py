@@ -5,13 +5,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from tussle.aircraft.constants import SEA_LEVEL_PRESSURE
+from tussle.aircraft.constants import FOOT, SEA_LEVEL_PRESSURE
 from tussle.aircraft.functions import table_of_pairs
 from tussle.aircraft.node import Element
 from tussle.aircraft.propulsion.bench import Bench, slot
 from tussle.aircraft.propulsion.runtime import PASCAL_PER_PSF
 from tussle.aircraft.propulsion.thruster import Propeller
-from tussle.aircraft.units import FOOT
 
 PASCAL_PER_INHG = 3386.38
 STANDARD = 101320.73  # [Pa]

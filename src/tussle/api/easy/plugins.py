@@ -12,9 +12,18 @@ from tussle.api.easy.shared import Shared
 from tussle.api.easy.values import make_type
 from tussle.api.easy.worlds import WorldShared, make_world_types
 from tussle.api.group import GroupView
-from tussle.api.kinds import Autonomy, Controller, EntityPlugin, Interaction, Metric, Sensor, WorldPlugin
+from tussle.api.kinds import (
+    Autonomy,
+    Controller,
+    EntityPlugin,
+    Interaction,
+    Metric,
+    Sensor,
+    WorldPlugin,
+    named,
+    number,
+)
 from tussle.api.plugin import Plugin
-from tussle.api.results import named, number
 from tussle.api.world import WorldView
 from tussle.declare.columns import Param
 from tussle.errors import ParameterError, listed, nearest_name

@@ -16,8 +16,7 @@ from tussle.api.easy.entities import (
     squared_distance,
     whole_id,
 )
-from tussle.api.easy.search import Search
-from tussle.api.easy.shared import RandomNumbers, WorldDraw
+from tussle.api.easy.shared import RandomNumbers, Search, WorldDraw
 from tussle.api.easy.values import (
     BODY,
     VECTORS,

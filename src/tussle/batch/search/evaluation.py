@@ -22,8 +22,8 @@ from tussle.errors import BatchError, ParameterError, TussleError
 from tussle.mission import Mission
 
 if TYPE_CHECKING:
-    from tussle.batch.progress import Progress
     from tussle.batch.results import Results
+    from tussle.batch.tasks import Progress
 
 WORTH_PROCESSES = 4.0
 """CPU time of a round [s] below which processes would take longer to start than they save."""

@@ -29,7 +29,7 @@ from tussle.mission import Mission
 from tussle.record.run_file import versions
 
 if TYPE_CHECKING:
-    from tussle.batch.progress import Progress
+    from tussle.batch.tasks import Progress
 
 
 @dataclass

@@ -28,7 +28,7 @@ def merged(cls: type[Any]) -> str:
         text = path.read_text(encoding="utf-8")
     except (OSError, TypeError) as error:
         raise ParameterError(f"--from {cls.__name__}: its source cannot be read: {error}") from error
-    package = cls.__module__.rpartition(".")[0]
+    package = cls.__module__ if path.stem == "__init__" else cls.__module__.rpartition(".")[0]
     beside = path.with_name("kernels.py")
     if not beside.is_file() or f"from {package} import kernels" not in text:
         return text

@@ -9,8 +9,7 @@ from typing import Any, Final
 import numpy as np
 
 from tussle.declare.messages import Message, Messages
-from tussle.numeric.arrays import numbers_below
-from tussle.numeric.segments import order_by_row
+from tussle.numeric.arrays import numbers_below, order_by_row
 
 EVERYONE: Final = "everyone"
 SAME_ENTITY: Final = "same entity"

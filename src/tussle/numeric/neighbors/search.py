@@ -5,8 +5,6 @@ place as float64. A team filter is a mode, ANY, SAME or DIFFERENT, and the team 
 in the sorted order of the index, `me` the place of the querying entity.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

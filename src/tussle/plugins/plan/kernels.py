@@ -1,7 +1,5 @@
 """Kernels of the planner's tree."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from tussle.numeric.kernel import device, kernel

@@ -14,7 +14,7 @@ from tussle.mission import Mission
 from tussle.record.plugin_columns import PluginColumn
 from tussle.view.drawn import Shape
 from tussle.view.frame import Event, Frame
-from tussle.view.page.settings import differing_settings
+from tussle.view.page.formatting import differing_settings
 from tussle.view.scenery import Scenery
 from tussle.view.sight import Sight
 from tussle.view.style import Colour, Style

@@ -16,9 +16,8 @@ from tussle.view.page.packing import ints
 from tussle.view.scenery import Scenery
 from tussle.view.shapes import MODELS, Mesh
 from tussle.view.sight import Sight, range_of
-from tussle.view.solids import MAX_FACES
+from tussle.view.solids import MAX_FACES, Terrain
 from tussle.view.style import Style
-from tussle.view.terrain import Terrain
 from tussle.world.rays.surfaces import MeshPart
 from tussle.world.rays.textures import jpeg
 

@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from tussle.declare import displays
+from tussle.declare.displays import counted, shortened
 from tussle.declare.units import split_units, unit_of
 from tussle.engine.result import WorldResult
 from tussle.errors import clipped
+from tussle.mission import Mission
+from tussle.mission.paths import values_of
+from tussle.record.event_texts import end_text
 from tussle.view.entity import EntityState, Reading, ShownMessage
 from tussle.view.feed import TopicTraffic
+from tussle.view.recording import Recording
 
 MAX_ITEMS = 6
 """Largest number of items of a list that are shown."""
@@ -131,3 +137,98 @@ def feed_rows(topics: Sequence[TopicTraffic]) -> list[tuple[str, int, str]]:
 def _message_row(message: ShownMessage) -> Row:
     fields = "; ".join(f"{name} {number(value)}" for name, value in message.fields.items())
     return message.topic, f"{message.sender or 'world'}: {fields}"
+
+
+LEFT_OUT = "run.blocks", "run.scene", "run.limits", "run.name"
+
+
+def differing_settings(a: Recording, b: Recording) -> list[tuple[str, str, str]]:
+    """Return the settings that differ between two runs: path, value of the first, value of the second; "–" where one has no such setting.
+
+    They are those of the missions where both can be read, else those that `run.json` lists.
+    """
+    one, other = a.mission, b.mission
+    if one is not None and other is not None:
+        settings = [{**_played(a), **_of_mission(one)}, {**_played(b), **_of_mission(other)}]
+    else:
+        settings = [{**_played(run), **_listed(run)} for run in (a, b)]
+    paths = dict.fromkeys([*settings[0], *settings[1]])
+    pairs = [(path, settings[0].get(path, "–"), settings[1].get(path, "–")) for path in paths]
+    return [(path, x, y) for path, x, y in pairs if x != y]
+
+
+def _played(run: Recording) -> dict[str, str]:
+    """Seed, and the version that played it."""
+    info, worlds = run.run.info, run.run.info.get("worlds", [])
+    found = {"seed": str(worlds[run.world]["seed"])} if run.world < len(worlds) else {}
+    version = info.get("versions", {}).get("tussle")
+    return found | ({"tussle": str(version)} if version else {})
+
+
+def _of_mission(mission: Mission) -> dict[str, str]:
+    """Every value of a mission by its path, as text."""
+    return {path: _text(value) for path, value in values_of(mission).items() if path not in LEFT_OUT}
+
+
+def _text(value: Any) -> str:
+    """A value in SI units, or the name of a class."""
+    if isinstance(value, type):
+        return value.__name__
+    if isinstance(value, tuple):
+        return " ".join(_text(each) for each in value)
+    return "none" if value is None else number(value)
+
+
+def _listed(run: Recording) -> dict[str, str]:
+    """What `run.json` says of the mission."""
+    said = run.run.info.get("mission", {})
+    found = {
+        f"run.{name}": _text(value) for name, value in said.items() if isinstance(value, (int, float, str))
+    }
+    for block in said.get("blocks", []):
+        found |= {f"{block['name']}.{name}": str(block[name]) for name in ("team", "count")}
+        found |= {f"{block['name']}.{plugin.partition('(')[0]}": plugin for plugin in block["plugins"]}
+    return found | {plugin.partition("(")[0]: plugin for plugin in said.get("world_plugins", [])}
+
+
+MAX_BLOCKS = 20
+"""Blocks that are listed."""
+MAX_LENGTH = 400
+"""Largest number of characters in the list of a block's plugins."""
+Fact = tuple[str, str]
+
+
+def mission_facts(mission: Mapping[str, Any], teams: Mapping[int, str]) -> list[Fact]:
+    """Return names and values of what a mission is.
+
+    Args:
+        mission: The mission as `run.json` has it, see `tussle.record.run_file.mission_entry`.
+        teams: Number and name of each team.
+    """
+    facts = [("Mission", str(mission["name"]) or "–"), ("Step", f"{mission['dt']:g} s")]
+    if end := _end(mission):
+        facts.append(("End", end))
+    blocks = mission["blocks"]
+    for team, name in teams.items():
+        n = sum(block.get("count") or 0 for block in blocks if block["team"] == team)
+        facts.append((f"Team {team}", f"{name}: {counted(n, 'entity', 'entities')}" if n else name))
+    facts += [(f"Plugins of {block['name']}", _plugins(block["plugins"])) for block in blocks[:MAX_BLOCKS]]
+    if len(blocks) > MAX_BLOCKS:
+        facts.append(("Plugins", f"of {counted(len(blocks) - MAX_BLOCKS, 'more block')} are not listed"))
+    if world := mission.get("world_plugins"):
+        facts.append(("Plugins of the world", _plugins(world)))
+    return facts
+
+
+def _plugins(texts: Iterable[str]) -> str:
+    return shortened(", ".join(text.partition("(")[0] for text in texts), MAX_LENGTH)
+
+
+def _end(mission: Mapping[str, Any]) -> str:
+    """What ends the game: "500 s, one team is left"."""
+    end = float(mission.get("end") or math.inf)
+    conditions = mission.get("end_conditions") or ()
+    parts = [
+        f"{end:g} s" if c == "time" else end_text(c) for c in conditions if c != "time" or math.isfinite(end)
+    ]
+    return ", or ".join(parts)

@@ -28,9 +28,8 @@ from tussle.view.page.chunks import FULL_HEALTH, UNIT, pack, step_of
 from tussle.view.page.commands import ID, IDS, MAX_ID, STICKS, WANTED, Command, game_commands, read_command
 from tussle.view.page.document import event_rows
 from tussle.view.page.drawing import drawing_message
-from tussle.view.page.facts import mission_facts
 from tussle.view.page.failures import Failures
-from tussle.view.page.formatting import entity_sections, feed_rows, result_rows
+from tussle.view.page.formatting import entity_sections, feed_rows, mission_facts, result_rows
 from tussle.view.page.packing import message
 from tussle.view.page.seen import SeenGame
 from tussle.view.series import OF_TEAMS, Changes, CurveName, StepSeries

@@ -20,7 +20,7 @@ from tussle.view.page.chunks import ANGLE_ERROR, FULL_HEALTH, UNIT, pack, positi
 from tussle.view.page.compare import Comparison
 from tussle.view.page.document import event_rows, game_document, scenery_blobs
 from tussle.view.page.drawing import drawing_message
-from tussle.view.page.facts import mission_facts
+from tussle.view.page.formatting import mission_facts
 from tussle.view.page.packing import ints, message, reals
 from tussle.view.page.recorded_curves import column_changes, quantities_of, run_changes
 from tussle.view.recording import Recording

@@ -5,8 +5,6 @@ ray itself is inside the leaf's box, and the first hit is the smallest pair (dis
 depend on the rays beside it, on the order of the visits or on the shape of the rest of the tree.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Whether spheres touch triangles, bodies or a height field."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """CommandStringRelay as in SCRIMMAGE."""
 
-from __future__ import annotations
-
 from tussle.api import Children
 from tussle.plugins.stock.autonomy import command_string_relay
 from tussle.plugins.stock.autonomy.command_string_relay import TopicRelay

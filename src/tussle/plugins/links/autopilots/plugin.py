@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 
 from tussle.api import Autonomy, GroupView, Handle, Output, Param, State
-from tussle.api.channel_map import channel_outputs, write_channels
-from tussle.api.channels import CHANNEL_UNITS
+from tussle.api.channel_map import CHANNEL_UNITS, channel_outputs, write_channels
 from tussle.plugins.links.autopilots.frames import vehicle_states
 from tussle.plugins.links.autopilots.link import MAX_PORT, AutopilotLink, OwnedPorts, StepClock, await_links
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from tussle.api import Autonomy, Children, GroupView, Param, State
-from tussle.api.timed_fault import TimedFault
+from tussle.api.channel_fault import TimedFault
 
 
 class ClockOffset(TimedFault, Autonomy):

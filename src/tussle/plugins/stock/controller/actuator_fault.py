@@ -6,7 +6,7 @@ import numpy as np
 
 from tussle.api import Controller, GroupView, Input, Output
 from tussle.api.channel_fault import ChannelFault, ChannelsParam, channel_names
-from tussle.api.channels import CHANNEL_UNITS
+from tussle.api.channel_map import CHANNEL_UNITS
 
 
 class ActuatorFault(ChannelFault, Controller):

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from tussle.api import Controller, GroupView, Input, Output, Param, Publish, State, Subscribe, service
-from tussle.api.channels import CHANNEL_UNITS
+from tussle.api.channel_map import CHANNEL_UNITS
 from tussle.declare import texts
 from tussle.declare.messages import ChargeAdded, ChargePercentage
 from tussle.errors import ParameterError, listed, nearest_name

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import importlib
+import sys
+from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from tussle.api import GroupView, Handle, HistoricAttributes, Param, Sensor, State
-from tussle.plugins.links.ros.altitude import FIELDS, altitude_type
 from tussle.plugins.links.ros.link import RosLink
-from tussle.plugins.links.ros.node import checked_namespace
+from tussle.plugins.links.ros.node import checked_namespace, load_rospy
 from tussle.plugins.links.ros.robot import height_above_floor
 
 
@@ -85,3 +87,33 @@ class ROSAltimeter(Sensor):
             for field, value in zip(FIELDS.split(), values[:, row].tolist(), strict=True):
                 setattr(message, field, value)
             link.publish(f"{name}/altimeter", message)
+
+
+ALTITUDE = "mavros_msgs/Altitude"
+FIELDS = "monotonic amsl local relative terrain bottom_clearance"
+"""Fields [m], of MAVLink's message ALTITUDE (https://mavlink.io/en/messages/common.html#ALTITUDE)."""
+
+
+@cache
+def altitude_type() -> Any:
+    """The type, made from its definition: nodes that have it from MAVROS receive it as theirs.
+
+    Raises:
+        MissingExtraError: rospy is not installed.
+    """
+    load_rospy()
+    before = list(sys.path)  # genpy adds a temporary folder
+    try:
+        dynamic = importlib.import_module("genpy.dynamic")
+        lines = [
+            "std_msgs/Header header",
+            *(f"float32 {name}" for name in FIELDS.split()),
+            "=" * 80,
+            "MSG: std_msgs/Header",
+            "uint32 seq",
+            "time stamp",
+            "string frame_id",
+        ]
+        return dynamic.generate_dynamic(ALTITUDE, "\n".join(lines) + "\n")[ALTITUDE]
+    finally:
+        sys.path[:] = before

@@ -8,7 +8,7 @@ import numpy as np
 
 from tussle.api import GroupView, Output, Param, RaggedColumn, Sensor, State
 from tussle.api.channel_fault import ChannelFault, ChannelsParam, channel_names
-from tussle.api.channels import MEASURED_CHANNELS, MEASURED_LISTS
+from tussle.api.channel_map import MEASURED_CHANNELS, MEASURED_LISTS
 from tussle.errors import ParameterError, listed, nearest_name
 
 MEMORY = "freeze", "delay"

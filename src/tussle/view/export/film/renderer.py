@@ -20,8 +20,8 @@ from tussle.view.export.film.ground import Tints, grid_lines, ground_width
 from tussle.view.frame import Frame
 from tussle.view.scenery import Scenery
 from tussle.view.shapes import MODELS, Mesh, ball
+from tussle.view.solids import Terrain
 from tussle.view.style import Style
-from tussle.view.terrain import Terrain
 from tussle.world.rays.surfaces import MeshPart
 
 WINDOW_VARIABLE = "VTK_DEFAULT_OPENGL_WINDOW"

@@ -6,8 +6,6 @@ is not followed. The distance of convex bodies that move along a line is a conve
 pass the first touch (conservative advancement; B. Mirtich, Impulse-based dynamic simulation of rigid body systems, 1996, section 2.3).
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

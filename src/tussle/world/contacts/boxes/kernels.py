@@ -9,8 +9,6 @@ normal from the second body to the first, point of contact seen from the centre 
 number by which a contact is known again in the next step.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -5,8 +5,6 @@ guess. Overlaps are undone by moves that leave the velocities alone (split impul
 so that worlds may be solved in any order and at the same time.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -3,8 +3,6 @@
 The triangle of a wall, of a building or of terrain is solid behind its outward normal; that of a mesh has two sides.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Ways of bodies that do not lead into others."""
 
-from __future__ import annotations
-
 from tussle.numeric.kernel import kernel
 from tussle.world.contacts.boxes.kernels import dot, vector
 

@@ -1,7 +1,5 @@
 """Choice of a direction among obstacles."""
 
-from __future__ import annotations
-
 import math
 
 from tussle.numeric import sincos, wrap

@@ -1,7 +1,5 @@
 """Predator kernels: target choice, capture claims, and pure pursuit with unit gain."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Velocity, attitude and rate loops of a multirotor, and the speeds of its rotors."""
 
-from __future__ import annotations
-
 import math
 
 from tussle.numeric.kernel import device, kernel

@@ -1,7 +1,5 @@
 """Search for pairs that come within range on straight ways."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """DoubleIntegrator's law: exact for constant commands, except in the step in which the speed reaches its limit."""
 
-from __future__ import annotations
-
 from tussle.numeric import atan2
 from tussle.numeric.kernel import device
 from tussle.numeric.paths import clamp, shortened

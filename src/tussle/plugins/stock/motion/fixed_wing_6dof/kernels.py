@@ -1,7 +1,5 @@
 """Air loads of an aircraft with linear derivatives, in the axes of flight mechanics: x forward, y right, z down."""
 
-from __future__ import annotations
-
 import math
 
 from tussle.numeric import atan2

@@ -1,7 +1,5 @@
 """HarmonicOscillator kernel: RK4 for a linear equation. A stiff substep is split into many short steps by doubling."""
 
-from __future__ import annotations
-
 from tussle.numeric.kernel import kernel
 
 COARSEST = 0.25

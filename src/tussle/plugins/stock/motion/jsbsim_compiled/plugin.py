@@ -11,9 +11,8 @@ import numpy as np
 
 from tussle.aircraft.compile import CompiledAircraft, compile_aircraft, save_source
 from tussle.aircraft.files import package_root
-from tussle.aircraft.initial import place_by_quaternion, run_initial
+from tussle.aircraft.initial import Script, place_by_quaternion, read_script, run_initial
 from tussle.aircraft.node import AircraftError
-from tussle.aircraft.script import Script, read_script
 from tussle.aircraft.trim import LinearModel, TrimPoint, level_flight, linearize, throttles_of, trim
 from tussle.api import Input, MotionBody, Param, RigidBodyModel
 from tussle.api.range_kernel import RangeKernel

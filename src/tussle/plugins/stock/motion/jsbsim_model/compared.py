@@ -11,9 +11,8 @@ import numpy as np
 
 from tussle.aircraft.compile import CompiledAircraft, compile_aircraft
 from tussle.aircraft.files import package_root
-from tussle.aircraft.initial import place, run_initial
+from tussle.aircraft.initial import Script, place, read_script, run_initial
 from tussle.aircraft.node import AircraftError
-from tussle.aircraft.script import Script, read_script
 from tussle.errors import ParameterError
 from tussle.plugins.stock.motion.jsbsim_model.flight import FOOT, THROTTLES, Aircraft, JSBSimFlight
 from tussle.world.geodesy import Origin

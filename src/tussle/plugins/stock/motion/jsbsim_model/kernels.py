@@ -1,7 +1,5 @@
 """Conversion of the states of JSBSim to the world frame."""
 
-from __future__ import annotations
-
 import math
 
 from tussle.numeric import cos, sin

@@ -3,8 +3,6 @@
 Rows go through scratch arrays in blocks, because LLVM vectorises loops over few arrays only.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from tussle.numeric import sincos, wrap

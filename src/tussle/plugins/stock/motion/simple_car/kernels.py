@@ -1,7 +1,5 @@
 """SimpleCar's law: an exact circular arc, and a free fall."""
 
-from __future__ import annotations
-
 import math
 
 from tussle.numeric import sincos, tan

@@ -1,7 +1,5 @@
 """SimpleQuadrotor's law: RK4, which is Simpson's rule because the acceleration depends on time only."""
 
-from __future__ import annotations
-
 from tussle.numeric import sincos
 from tussle.numeric.kernel import device
 from tussle.numeric.paths import shortened

@@ -1,7 +1,5 @@
 """SingleIntegrator kernels. Rows are processed in blocks of scratch, because LLVM vectorises only loops over few arrays."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -14,8 +14,6 @@ The output is computed in blocks of rows, with one scratch array each for angles
 few arrays, and it recognizes that columns at fixed distances in one array do not overlap.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

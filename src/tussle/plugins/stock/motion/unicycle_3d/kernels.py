@@ -4,8 +4,6 @@ The attitude is exact up to rounding. The path is integrated with Simpson's rule
 RK4. The alternative, RK4 on the quaternion, drifts off the unit sphere and needs a correction term.
 """
 
-from __future__ import annotations
-
 import math
 
 from tussle.numeric import sincos

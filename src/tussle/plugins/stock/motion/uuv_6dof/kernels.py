@@ -5,8 +5,6 @@ equations of motion in section 4.5, coefficients in appendix C. Units are those 
 [m/s] and rates [rad/s].
 """
 
-from __future__ import annotations
-
 from tussle.numeric.kernel import device
 from tussle.numeric.rigid_body import add, cross, scale, solve, times
 

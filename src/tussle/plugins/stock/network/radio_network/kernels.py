@@ -1,7 +1,5 @@
 """Transmission times of messages, and fading of their signals."""
 
-from __future__ import annotations
-
 from tussle.numeric import exp, log
 from tussle.numeric.kernel import kernel
 

@@ -1,7 +1,5 @@
 """Add noise to the states of contacts."""
 
-from __future__ import annotations
-
 from tussle.numeric.kernel import kernel
 from tussle.numeric.quaternion import quat_conjugate, quat_from_euler, quat_multiply
 

@@ -1,7 +1,5 @@
 """Add noise to the state of a rigid body."""
 
-from __future__ import annotations
-
 from tussle.numeric.kernel import kernel
 from tussle.numeric.quaternion import quat_conjugate, quat_from_euler, quat_multiply
 

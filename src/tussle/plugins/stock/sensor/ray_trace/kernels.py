@@ -1,7 +1,5 @@
 """Points where rays end."""
 
-from __future__ import annotations
-
 import math
 
 from tussle.numeric.kernel import kernel

@@ -1,1 +1,0 @@
-"""Metrics with the laws of SCRIMMAGE."""

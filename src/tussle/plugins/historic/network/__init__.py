@@ -1,1 +1,0 @@
-"""Networks with the laws of SCRIMMAGE."""

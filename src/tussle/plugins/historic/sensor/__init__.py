@@ -1,1 +1,0 @@
-"""Sensors with the laws of SCRIMMAGE."""
