@@ -13,7 +13,7 @@ import gymnasium
 import numpy as np
 
 from tussle.api import GroupView
-from tussle.api.channels import CHANNEL_UNITS
+from tussle.api.channel_map import CHANNEL_UNITS
 from tussle.documents import read_bytes
 from tussle.errors import MissingExtraError, ParameterError, listed, nearest_name
 from tussle.folders import real_path
