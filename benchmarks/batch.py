@@ -1,6 +1,6 @@
 """Batches of the 500 s predator/prey game: wall time, CPU time and memory by processes, stack size and number of runs.
 
-    python benchmarks/batch.py [--runs 1000] [--parts game processes stacks flat one] [--json FILE]
+    python benchmarks/batch.py [--runs 1000] [--parts game processes stacks flat one large] [--json FILE]
 
 Each row runs `tussle batch` in a separate process, start-up included, with 12 motion substeps, as in the measurement of the original.
 The original takes 2.5 CPU s per game, about 21 minutes of wall time for 1,000 games on two cores.
@@ -9,6 +9,7 @@ The original takes 2.5 CPU s per game, about 21 minutes of wall time for 1,000 g
 from __future__ import annotations
 
 import argparse
+import json
 import resource
 import statistics
 import subprocess
@@ -19,9 +20,14 @@ from pathlib import Path
 from typing import Any
 
 import measuring
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from tussle.record.parquet_blocks import ParquetBlocks
 
 ORIGINAL = 2.5
-PARTS = ("game", "processes", "stacks", "flat", "one")
+PARTS = ("game", "processes", "stacks", "flat", "one", "large")
 GAME = ["predator_prey", "run.motion_multiplier=12"]
 SHORT = ["predator_prey", "prey=20", "predators=2", "--end", "10"]
 
@@ -94,6 +100,33 @@ def one(_: int) -> list[dict[str, Any]]:
     return [rows[0], rows[1] | {"cpu_ratio": ratio}]
 
 
+def large(_: int) -> list[dict[str, Any]]:
+    """A million games to analyse: 10,000 short ones, whose rows are repeated with other numbers."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "b"
+        tussle("batch", *SHORT, "--runs", "10000", "--out", str(path))
+        repeat(path, 100)
+        report = "report", str(path), "--out", f"{folder}/report.html"
+        return [{"command": name} | tussle(name, *more) for name, *more in (("analyze", str(path)), report)]
+
+
+def repeat(path: Path, times: int) -> None:
+    """Write the runs of a complete batch without variables so many times, with the numbers and seeds that follow."""
+    info = json.loads((path / "batch.json").read_text(encoding="utf-8"))
+    n = info["n_runs"]
+    for name in ("design.parquet", "results.parquet", "alive.parquet"):
+        table = pq.read_table(path / name)
+        run = table["run"].to_numpy()
+        with ParquetBlocks(path / name, table.schema) as file:
+            for first in range(0, times * n, n):
+                new = {"run": run + first, "seed": (run + first + info["first_seed"]).astype(np.uint64)}
+                columns = [new.get(column, table[column]) for column in table.column_names]
+                file.add(pa.table(columns, schema=table.schema))
+    info |= {"n_runs": times * n, "n_seeds": times * n}
+    info.pop("checksum")
+    (path / "batch.json").write_text(json.dumps(info), encoding="utf-8")
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument(
@@ -108,18 +141,17 @@ def main() -> None:
         "stacks": "Worlds side by side in one process",
         "flat": "More and more runs of a short game: cost of a run, memory",
         "one": "A batch of one",
+        "large": "A million games, to analyse and to report",
     }
     found = []
     for part in args.parts:
-        rows = {"game": game, "processes": processes, "stacks": stacks, "flat": flat, "one": one}[part](
-            args.runs
-        )
+        rows = {
+            "game": game, "processes": processes, "stacks": stacks, "flat": flat, "one": one, "large": large
+        }[part](args.runs)  # fmt: skip
         measuring.report(titles[part], rows, None)
         print()
         found += [{"part": part, **row} for row in rows]
     if args.json:
-        import json
-
         args.json.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
 
 

@@ -76,6 +76,15 @@ class Quantity:
         is_name = not isinstance(self._tree, (ast.BinOp, ast.UnaryOp))
         return is_name and next(_names(self._tree, self.text))[0] in SHARES
 
+    @property
+    def may_be_negative(self) -> bool:
+        """Whether an expression of shares may be below 0: it subtracts from anything but 1, or turns a sign."""
+        return any(
+            isinstance(node.op, ast.USub)
+            or (isinstance(node.op, ast.Sub) and getattr(node.left, "value", None) != 1)
+            for node in _operations(self._tree)
+        )
+
     def names(self, columns: Collection[str]) -> list[str]:
         """The columns that the expression names, each once, in order.
 
@@ -130,6 +139,17 @@ class Quantity:
 
     def __str__(self) -> str:
         return self.text
+
+
+def _operations(node: ast.expr) -> Iterator[ast.BinOp | ast.UnaryOp]:
+    """The operations of an expression."""
+    if isinstance(node, ast.BinOp):
+        yield node
+        yield from _operations(node.left)
+        yield from _operations(node.right)
+    elif isinstance(node, ast.UnaryOp):
+        yield node
+        yield from _operations(node.operand)
 
 
 def _names(node: ast.expr, text: str) -> Iterator[tuple[str, int | None]]:

@@ -348,7 +348,8 @@ class Results:
     def is_share(self, expression: str) -> bool:
         """Return whether a quantity is a share: its interval is within 0 and 1.
 
-        So are wins and ties, and everything else whose values lie between 0 and 1 in all runs, but for what every game counts.
+        So are wins and ties, and everything else whose values lie between 0 and 1 in all runs, but for what every game counts, and
+        for differences, which might be negative.
 
         Raises:
             ParameterError: There is no such quantity.
@@ -356,7 +357,9 @@ class Results:
         quantity = Quantity.parse(expression)
         columns = self._columns_for(quantity)
         is_count = quantity.names(columns) == [expression] and metric_of(expression) in COUNTED
-        return quantity.is_share or (not is_count and is_within_one(quantity.evaluate(columns)))
+        if quantity.is_share or is_count or quantity.may_be_negative:
+            return quantity.is_share
+        return is_within_one(quantity.evaluate(columns))
 
     @property
     def diminished(self) -> list[int]:

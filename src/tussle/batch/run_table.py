@@ -25,14 +25,17 @@ OF_RUNS = (*KEYS, *OF_RUN)
 class RunColumns:
     """A row per run and a column per metric and team, of results that come some runs at a time.
 
+    Args:
+        most: Largest number of runs.
+
     Attributes:
         teams: Numbers of the teams that have metrics.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, most: int) -> None:
+        self._most, self._n = most, 0
         self._runs = [RESULTS.empty_table().select(OF_RUNS)]
-        self._n = 0
-        self._values: dict[tuple[str, int | None], list[tuple[int, np.ndarray]]] = {}
+        self._values: dict[tuple[str, int | None], np.ndarray] = {}
         self._teams: set[int | None] = set()
 
     @property
@@ -56,25 +59,30 @@ class RunColumns:
         present, place = np.unique(code, return_inverse=True)
         values = np.full((len(present), len(numbers)), np.nan)
         values[place, row] = floats(results["value"])[is_metric]
-        for c, column in zip(present.tolist(), values, strict=True):
-            key = metrics[c // len(teams)], teams[c % len(teams)]
-            self._values.setdefault(key, []).append((self._n, column.copy()))
-        self._n += len(numbers)
+        new = slice(self._n, self._n + len(numbers))
+        for column in self._values.values():
+            column[new] = np.nan
+        for c, found in zip(present.tolist(), values, strict=True):
+            self._column(metrics[c // len(teams)], teams[c % len(teams)])[new] = found
+        self._n = new.stop
 
-    def taken(self) -> tuple[pa.Table, dict[str, np.ndarray]]:
-        """What was added, which is then gone from here, so that it is in memory once.
+    def _column(self, metric: str, team: int | None) -> np.ndarray:
+        """The values of a metric, of which only the memory that is written to is taken."""
+        if (metric, team) not in self._values:
+            self._values[metric, team] = np.empty(self._most)
+            self._values[metric, team][: self._n] = np.nan
+        return self._values[metric, team]
 
-        Returns:
-            One row per run, with its keys and how it ended; and name such as "score[2]" -> value for each run, (n_runs,), NaN where the run
-            does not have it.
-        """
-        runs, self._runs = pa.concat_tables(self._runs), []
-        found: dict[str, np.ndarray] = {}
-        for key in sorted(self._values, key=lambda each: (each[0], each[1] is not None, each[1] or 0)):
-            column = found[column_name(*key)] = np.full(self._n, np.nan)
-            for first, values in self._values.pop(key):
-                column[first : first + len(values)] = values
-        return runs, found
+    @property
+    def runs(self) -> pa.Table:
+        """One row per run: its keys, and how it ended."""
+        return pa.concat_tables(self._runs)
+
+    @property
+    def metrics(self) -> dict[str, np.ndarray]:
+        """Name such as "score[2]" -> value for each run, (n_runs,); NaN where the run does not have it."""
+        order = sorted(self._values, key=lambda each: (each[0], each[1] is not None, each[1] or 0))
+        return {column_name(*key): self._values[key][: self._n] for key in order}
 
 
 def floats(column: pa.ChunkedArray) -> np.ndarray:

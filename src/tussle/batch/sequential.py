@@ -11,7 +11,7 @@ import numpy as np
 
 from tussle.batch.plan import BatchPlan
 from tussle.batch.quantities import Quantity
-from tussle.batch.sequential_intervals import sequential_interval
+from tussle.batch.sequential_intervals import seen_in, sequential_interval
 from tussle.batch.statistics import LEVEL
 from tussle.batch.stopping import PlayedQuantities, Until
 from tussle.batch.target import Answers, Layout, Target, answers_of
@@ -184,8 +184,7 @@ class SequentialStop:
             is_open[self._answers(self.rule.target, n).wanted(most)] = True
         if self.rule.width is not None:
             games = self._games.matrix(self.rule.width.quantity, n)
-            known = games[np.isfinite(games)]
-            seen = (float(known.min()), float(known.max())) if len(known) else (-math.inf, math.inf)
+            seen = seen_in(games, self.rule.width.quantity.may_be_negative)
             for point in np.flatnonzero(is_open).tolist():
                 own = games[:, point]
                 low, high = sequential_interval(own[np.isfinite(own)], 1.0 - LEVEL, seen)

@@ -17,6 +17,20 @@ MIN_FOR_NORMAL = 10
 """Fewest values for the interval of a quantity without bounds, whose mean is taken to be normal."""
 
 
+def seen_in(values: np.ndarray, may_be_negative: bool) -> tuple[float, float]:
+    """Smallest and largest value in all runs, as `sequential_interval` takes them; infinite if none is known.
+
+    Args:
+        values: Of all points; NaN where a game failed or is not played.
+        may_be_negative: Of a difference of shares: that it was never negative does not bound it by 0.
+    """
+    known = values[np.isfinite(values)]
+    if not len(known):
+        return -math.inf, math.inf
+    low, high = float(known.min()), float(known.max())
+    return (-1.0, 1.0) if may_be_negative and low >= 0.0 and high <= 1.0 else (low, high)
+
+
 def sequential_interval(values: np.ndarray, alpha: float, seen: tuple[float, float]) -> tuple[float, float]:
     """Interval of a mean from n values, (n,), that holds for all n at once: a confidence sequence.
 
@@ -25,8 +39,8 @@ def sequential_interval(values: np.ndarray, alpha: float, seen: tuple[float, flo
     Args:
         values: Finite values of independent runs, in any order.
         alpha: Error probability, both sides together.
-        seen: Smallest and largest value of the quantity in all runs, those of other points included. Between 0 and 1 the quantity is
-            taken to have these bounds.
+        seen: Smallest and largest value of the quantity in all runs, those of other points included, see `seen_in`. Between 0 and 1
+            the quantity is taken to have these bounds.
 
     Returns:
         Its ends; infinite where too few values are known.

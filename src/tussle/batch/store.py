@@ -63,7 +63,7 @@ class StoredBatch:
     ) -> None:  # fmt: skip
         self.path, self.info, self.design = path, info, design
         self.notes = [] if notes is None else notes
-        columns, held, size = RunColumns(), list[tuple[pa.Table, pa.Table]](), 0
+        columns, held, size = RunColumns(len(design)), list[tuple[pa.Table, pa.Table]](), 0
         for some in finished:
             columns.add(some[0])
             size += sum(table.nbytes for table in some)
@@ -72,8 +72,7 @@ class StoredBatch:
             else:
                 held.clear()
         self._finished = finished if path is None else held if size <= MAX_HELD else None
-        self.runs, self.metrics = columns.taken()
-        self.teams = columns.teams
+        self.runs, self.metrics, self.teams = columns.runs, columns.metrics, columns.teams
 
     @cached_property
     def _tables(self) -> tuple[pa.Table, pa.Table]:

@@ -13,7 +13,7 @@ import numpy as np
 
 from tussle.batch.quantities import Quantity
 from tussle.batch.selection import written
-from tussle.batch.sequential_intervals import sequential_interval
+from tussle.batch.sequential_intervals import seen_in, sequential_interval
 from tussle.batch.statistics import LEVEL
 from tussle.batch.variables import Choice, Range, Variable
 from tussle.declare.displays import decimals
@@ -455,8 +455,7 @@ def answers_of(
         points: Values of each point.
         matrix: The quantity by seed and point, (n_seeds, n_points); NaN where a game failed or is not played.
     """
-    known = matrix[np.isfinite(matrix)]
-    seen = (float(known.min()), float(known.max())) if len(known) else (-math.inf, math.inf)
+    seen = seen_in(matrix, target.quantity.may_be_negative)
     found = []
     for values, levels in zip(layout.choices, layout.levels, strict=True):
         alpha = (1.0 - LEVEL) / len(levels)

@@ -5,8 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from hypothesis import strategies as st
+from made_batches import made_batch
 
 from tussle.batch.quantities import MAX_TEXT, Quantity
+from tussle.batch.results import Results
+from tussle.batch.sequential_intervals import seen_in, sequential_interval
 from tussle.errors import ParameterError
 
 COLUMNS = {
@@ -85,6 +88,27 @@ def test_shares_are_told_from_other_numbers():
     assert [Quantity.parse(t).is_share for t in ("wins[2]", "wins", "ties", "score[2]", "wins[2]-wins[-1]", "-ties")] == [
         True, True, True, False, False, False,
     ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("text", "may_be"),
+    [
+        ("wins[2]", False), ("wins[-1]", False), ("wins[2]/2+ties", False), ("1-wins[2]", False), ("1-wins[-1]*ties", False),
+        ("wins[2]-wins[3]", True), ("-wins[2]", True), ("0.5-wins[2]", True), ("1-(wins[2]-ties)", True), ("wins[2]*-2", True),
+    ],
+)  # fmt: skip
+def test_differences_are_no_shares_whatever_was_seen_of_them(text, may_be):
+    """That no game had a negative difference does not bound it by 0: its interval is no share's."""
+    assert Quantity.parse(text).may_be_negative == may_be
+    level = made_batch(
+        {2: np.full((40, 1), 3.0), 3: np.full((40, 1), 3.0)}, metrics={"G.s": {None: np.zeros((40, 1))}}
+    )
+    expression = text.replace("ties", "G.s").replace("[-1]", "[3]")
+    assert Results(level).is_share(expression) == (not may_be)
+    values = np.zeros((40, 1))
+    low, high = sequential_interval(values[:, 0], 0.05, seen_in(values, may_be))
+    assert (low < -0.1) == may_be
+    assert low <= 0.0 < high
 
 
 NUMBERS = st.integers(0, 99).map(str)
