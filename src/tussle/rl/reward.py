@@ -306,7 +306,7 @@ class Term:
                 f"returns {values.dtype}, {values.ravel()[0]!r:.40}; it returns finite numbers"
             )
         np.multiply(values, self.weight, out=out, casting="same_kind")
-        wrong = int(kernels.SETTLE[out.dtype.name](out.reshape(-1), now.was_alive.reshape(-1)))
+        wrong = int(kernels.SETTLE[out.dtype](out.reshape(-1), now.was_alive.reshape(-1)))
         if wrong >= 0:
             world, agent = divmod(wrong, agents)
             raise ParameterError(
