@@ -339,7 +339,7 @@ def settle(out, was_alive):
     return -1
 
 
-SETTLE = {np.dtype("f4"): kernel("Sw B -> i8")(settle), np.dtype("f8"): kernel("Fw B -> i8")(settle)}
+SETTLE = {"float32": kernel("Sw B -> i8")(settle), "float64": kernel("Fw B -> i8")(settle)}
 """`settle` by type of the numbers."""
 
 

@@ -23,6 +23,7 @@ SHARES = ("agent", "team", "world")
 COUNTED = (CAPTURE, COLLISION, DEATH, FLAG)
 """Kinds of events that a situation counts."""
 IDS = ("id", "other")
+SETTLE = {np.dtype(name): settle for name, settle in kernels.SETTLE.items()}
 NOBODY = -1
 """Id of an agent that has not been born; events have 0 for none."""
 
@@ -306,7 +307,7 @@ class Term:
                 f"returns {values.dtype}, {values.ravel()[0]!r:.40}; it returns finite numbers"
             )
         np.multiply(values, self.weight, out=out, casting="same_kind")
-        wrong = int(kernels.SETTLE[out.dtype](out.reshape(-1), now.was_alive.reshape(-1)))
+        wrong = int(SETTLE[out.dtype](out.reshape(-1), now.was_alive.reshape(-1)))
         if wrong >= 0:
             world, agent = divmod(wrong, agents)
             raise ParameterError(
