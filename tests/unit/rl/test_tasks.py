@@ -119,3 +119,18 @@ def test_blocks_whose_names_have_spaces_can_learn(learners, names):
             _ = task.blocks
     else:
         assert [b.name for b in task.blocks] == names
+
+
+@pytest.mark.parametrize(
+    ("wrong", "told"),
+    [
+        (lambda: rl.PreyEscape(action=(rl.Act("speed turn_rate", 0.0, 1.0),)).decoders, "only levels set several channels"),
+        *((lambda limit=limit: rl.PreyEscape(time_limit=limit), "a finite number of seconds > 0")
+          for limit in (np.inf, np.nan, -1.0, 0.0)),
+        *((lambda space=space, agent=agent: getattr(rl.PreyEscape(), space)(agent), "agent = ")
+          for space in ("observation_space", "action_space") for agent in ("prey_3", -1, 100, 1.5)),
+    ],
+)  # fmt: skip
+def test_values_that_mean_nothing_are_refused(wrong, told):
+    with pytest.raises(ParameterError, match=re.escape(told)):
+        wrong()
