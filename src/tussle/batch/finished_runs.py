@@ -100,9 +100,7 @@ class FinishedRuns:
             old = old.filter(pc.is_in(old["run"], pc.unique(old_alive["run"]).cast(pa.int64())))
         results, alive = tables(played, self._design)
         for table in (results, alive):
-            check_values(
-                zip(table.column_names, table.columns, strict=True), RULES, self._path / PARTS, BatchError
-            )
+            _check(table, self._path / PARTS)
         # Each by its own runs: a batch that was killed at its end may have written one of the two.
         results = self._with_one_chance(_with_new(old, results, ("run", "team", "metric")))
         alive = _with_new(old_alive, alive, ("run", "t", "team"))
@@ -128,8 +126,12 @@ def _checked(table: ParquetTable, columns: pa.Schema, file: Path) -> Iterator[pa
     """The rows of a table, some at a time, with the columns that a former version did not write."""
     for batch in table:
         rows = completed(pa.Table.from_batches([batch]), columns)
-        check_values(zip(rows.column_names, rows.columns, strict=True), RULES, file, BatchError)
+        _check(rows, file)
         yield rows
+
+
+def _check(rows: pa.Table, file: Path) -> None:
+    check_values(zip(rows.column_names, rows.columns, strict=True), RULES, file, BatchError)
 
 
 def _drawn_groups(group: np.ndarray, chance: np.ndarray) -> set[int]:
@@ -200,11 +202,11 @@ class _Parts:
         if number not in self._open:
             if len(self._open) == MAX_OPEN_PARTS:
                 del self._open[next(iter(self._open))]
-            batches = list(
-                read_batches(self._files[number], [], BatchError, PLAYED, RULES, damage=notes, optional=LATER)
-            )
-            whole = completed(pa.Table.from_batches(batches), PLAYED) if batches else PLAYED.empty_table()
-            self._open[number] = whole.combine_chunks()
+            file = self._files[number]
+            batches = list(read_batches(file, [], BatchError, PLAYED, damage=notes, optional=LATER))
+            rows = completed(pa.Table.from_batches(batches), PLAYED) if batches else PLAYED.empty_table()
+            _check(rows, file)
+            self._open[number] = rows.combine_chunks()
         return self._open[number]
 
     def drawn_groups(self) -> set[int]:
