@@ -188,3 +188,33 @@ def test_importing_the_package_loads_no_shipped_plugin_and_no_optional_part():
     plugins = [name for name in loaded if re.fullmatch(r"tussle\.stock\.[a-z]+\..+", name)]
     assert not plugins
     assert not [name for name in loaded if is_within(name, OPTIONAL_PARTS)]
+
+
+DOORS = ("tussle.messages", "tussle.plan", "tussle.serve")  # which only users import
+LOADED = (
+    "tussle.plugins.stock",
+    "tussle.plugins.historic",
+    "tussle.cli.scaffold.templates",
+)  # by name or as text
+
+
+def test_each_module_is_imported_by_another():
+    """A module that has moved leaves no copy behind."""
+    files = {f: ".".join(f.relative_to(ROOT / "src").with_suffix("").parts) for f in python_files("src")}
+    imports = {f: {name for _, name in imported_modules(parsed(f))} for f in files}
+    texts = {
+        n.value
+        for f in files
+        for n in ast.walk(parsed(f))
+        if isinstance(n, ast.Constant) and isinstance(n.value, str)
+    }
+    used = {text.partition(":")[0] for text in texts}  # commands are loaded when they are called
+    used |= {part for names in imports.values() for name in names for part in (name, name.rpartition(".")[0])}
+    unused = {
+        name
+        for f, name in files.items()
+        if f.name not in ("__init__.py", "__main__.py")
+        and name not in used
+        and not is_within(name, (*DOORS, *LOADED))
+    }
+    assert not unused

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -100,7 +100,7 @@ class FinishedRuns:
             old = old.filter(pc.is_in(old["run"], pc.unique(old_alive["run"]).cast(pa.int64())))
         results, alive = tables(played, self._design)
         for table in (results, alive):
-            _check(table, self._path / PARTS)
+            check_rows(table, self._path / PARTS)
         # Each by its own runs: a batch that was killed at its end may have written one of the two.
         results = self._with_one_chance(_with_new(old, results, ("run", "team", "metric")))
         alive = _with_new(old_alive, alive, ("run", "t", "team"))
@@ -126,11 +126,16 @@ def _checked(table: ParquetTable, columns: pa.Schema, file: Path) -> Iterator[pa
     """The rows of a table, some at a time, with the columns that a former version did not write."""
     for batch in table:
         rows = completed(pa.Table.from_batches([batch]), columns)
-        _check(rows, file)
+        check_rows(rows, file)
         yield rows
 
 
-def _check(rows: pa.Table, file: Path) -> None:
+def check_rows(rows: pa.Table, file: Path) -> None:
+    """Check the values of a table of a batch.
+
+    Raises:
+        BatchError: One is out of its bounds.
+    """
     check_values(zip(rows.column_names, rows.columns, strict=True), RULES, file, BatchError)
 
 
@@ -205,7 +210,7 @@ class _Parts:
             file = self._files[number]
             batches = list(read_batches(file, [], BatchError, PLAYED, damage=notes, optional=LATER))
             rows = completed(pa.Table.from_batches(batches), PLAYED) if batches else PLAYED.empty_table()
-            _check(rows, file)
+            check_rows(rows, file)
             self._open[number] = rows.combine_chunks()
         return self._open[number]
 
@@ -318,12 +323,3 @@ def ordered(table: pa.Table, names: tuple[str, ...]) -> pa.Table:
     """A table sorted by some columns; rows without a team come before those of teams."""
     keys = pa.table({n: table[n].fill_null(-(2**31)) if n == "team" else table[n] for n in names})
     return table.take(pc.sort_indices(keys, sort_keys=[(name, "ascending") for name in names]))
-
-
-def whole(runs: Iterable[tuple[pa.Table, pa.Table]]) -> tuple[pa.Table, pa.Table]:
-    """All rows of results, and of the numbers of entities."""
-    results, alive = [RESULTS.empty_table()], [ALIVE.empty_table()]
-    for some, counts in runs:
-        results.append(some)
-        alive.append(counts)
-    return pa.concat_tables(results).combine_chunks(), pa.concat_tables(alive).combine_chunks()

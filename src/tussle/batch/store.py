@@ -11,22 +11,32 @@ from functools import cached_property
 from pathlib import Path
 from typing import IO, Any
 
+import numpy as np
 import pyarrow as pa
-import pyarrow.compute as pc
 
 from tussle.batch.consistency import check_design
-from tussle.batch.finished_runs import FinishedRuns, completed, row, whole
+from tussle.batch.finished_runs import FinishedRuns, check_rows, completed, row
 from tussle.batch.run_table import RunColumns
-from tussle.batch.schemas import BATCH, BATCH_FILE, DESIGN, DESIGN_FILE, LATER, PARTS, PLAYED, RULES, TABLES
+from tussle.batch.schemas import (
+    ALIVE,
+    BATCH,
+    BATCH_FILE,
+    DESIGN,
+    DESIGN_FILE,
+    LATER,
+    PARTS,
+    PLAYED,
+    RESULTS,
+    TABLES,
+)
 from tussle.batch.tasks import Finished
 from tussle.documents import is_count, json_text
 from tussle.errors import BatchError, RecordError
 from tussle.folders import lock, open_safely
 from tussle.record.parquet_blocks import ParquetBlocks
-from tussle.record.parquet_file import read_parquet
+from tussle.record.parquet_file import ParquetTable
 from tussle.record.run_file import plain, put_whole
 from tussle.record.stream import Stream
-from tussle.record.table_values import check_values
 
 MAX_IN_PART = 2000
 """Runs in one file of parts: each is a record batch, which in memory takes ten times what the run takes in a table."""
@@ -75,25 +85,26 @@ class StoredBatch:
         self.runs, self.metrics, self.teams = columns.runs, columns.metrics, columns.teams
 
     @cached_property
-    def _tables(self) -> tuple[pa.Table, pa.Table]:
-        if self._finished is not None:
-            return whole(self._finished)
-        assert self.path is not None
-        design = _read_design(self.path, read_info(self.path))  # the batch may have been gone on with since
-        results, alive = whole(FinishedRuns(self.path, design, []))
-        runs = self.runs["run"].combine_chunks()
-        results, alive = (table.filter(pc.is_in(table["run"], runs)) for table in (results, alive))
-        return results, alive
-
-    @property
     def table(self) -> pa.Table:
         """`RESULTS` of the finished runs."""
-        return self._tables[0]
+        return self._rows(RESULTS, 0)
 
-    @property
+    @cached_property
     def alive(self) -> pa.Table:
         """`ALIVE` of the finished runs."""
-        return self._tables[1]
+        return self._rows(ALIVE, 1)
+
+    def _rows(self, columns: pa.Schema, place: int) -> pa.Table:
+        """One of the two tables, of the runs that were finished when the batch was read."""
+        if self._finished is not None:
+            held = [some[place] for some in self._finished]
+            return pa.concat_tables([columns.empty_table(), *held]).combine_chunks()
+        assert self.path is not None
+        design = _read_design(self.path, read_info(self.path))  # the batch may have been gone on with since
+        is_there = np.zeros(len(design), bool)
+        is_there[self.runs["run"].to_numpy()] = True
+        read = (some[place] for some in FinishedRuns(self.path, design, []))
+        return pa.concat_tables(rows.filter(pa.array(is_there[rows["run"].to_numpy()])) for rows in read)
 
 
 class MemoryStore:
@@ -311,8 +322,9 @@ def read_table(path: Path, name: str, columns: pa.Schema, notes: list[str] | Non
     file = path / name
     if not file.exists():
         return None
-    table = completed(read_parquet(file, columns, BatchError, notes=notes, optional=LATER), columns)
-    check_values(zip(table.column_names, table.columns, strict=True), RULES, file, BatchError)
+    found = ParquetTable(file, columns, BatchError, notes=notes, optional=LATER).read()
+    table = completed(found, columns)
+    check_rows(table, file)
     return table
 
 

@@ -13,7 +13,7 @@ from tussle.documents import size_of
 from tussle.errors import ParameterError, RecordError, listed
 from tussle.mission.spec import MAX_COORDINATE
 from tussle.record.arrow_file import read_batches
-from tussle.record.parquet_file import MARGIN, MAX_EXPANSION, read_parquet
+from tussle.record.parquet_file import MARGIN, MAX_EXPANSION, ParquetTable
 from tussle.record.schema import TRAJECTORY, TRAJECTORY_FILE
 from tussle.tables import check_columns, check_one_state, read_csv, whole_numbers
 
@@ -150,7 +150,7 @@ def _read(place: Path) -> pa.Table:
             batches = list(read_batches(place, [], RecordError))
             return _columns(place, pa.Table.from_batches(batches, None if batches else TRAJECTORY))
         if name.endswith(".parquet"):
-            return read_parquet(place, pa.schema([]), RecordError, READ)
+            return ParquetTable(place, pa.schema([]), RecordError, READ).read()
         most = MARGIN + MAX_EXPANSION * size_of(place)
         return _columns(
             place,

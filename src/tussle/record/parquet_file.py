@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import BinaryIO
 
 import pyarrow as pa
 import pyarrow.compute as pc
@@ -90,6 +90,13 @@ class ParquetTable:
             batches = _decoded(file, self.schema, self._most, self._groups)
             yield from batches if self._groups is not None else list(batches)  # of a damaged file, nothing
 
+    def read(self) -> pa.Table:
+        """All rows; none if the file cannot be read, where that is only noted."""
+        batches = list(self)
+        if not self.is_readable:
+            return self.schema.empty_table()
+        return pa.Table.from_batches(batches, self.schema).combine_chunks()
+
     @contextmanager
     def _reported(self) -> Iterator[None]:
         """Tell why the file cannot be read."""
@@ -100,19 +107,6 @@ class ParquetTable:
             if self._notes is None:
                 raise self._error(f"{self._path}: cannot be read: {reason}") from None
             self._notes.append(f"{self._path.name} cannot be read: {reason}")
-
-
-def read_parquet(path: Path, wanted: pa.Schema, *options: Any, **named: Any) -> pa.Table:
-    """Read a table, without its damaged row groups; the arguments are those of `ParquetTable`.
-
-    Raises:
-        TussleError: As `ParquetTable` does.
-    """
-    table = ParquetTable(path, wanted, *options, **named)
-    batches = list(table)
-    if not table.is_readable:
-        return wanted.empty_table()
-    return pa.Table.from_batches(batches, table.schema).combine_chunks()
 
 
 def _columns_problem(schema: pa.Schema, names: list[str]) -> str:

@@ -32,9 +32,8 @@ class TaskParallelEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]  # Pett
         self.possible_agents = list(self.task.agent_names)
         self.agents: list[str] = []
         self._at: Any = []  # their numbers
-        self._joined = np.zeros(
-            len(self.possible_agents), np.int64
-        )  # decisions of the episode before that of each agent
+        # Decisions of the episode before the first of each agent.
+        self._joined = np.zeros(len(self.possible_agents), np.int64)
         self._rows: Any = None  # of the body table, which change when agents die or are born
         self._number = {name: a for a, name in enumerate(self.possible_agents)}
         self.observation_spaces = {name: self.task.observation_space(a) for name, a in self._number.items()}

@@ -12,7 +12,7 @@ from recorded_games import hunt, record
 from tussle import load_run
 from tussle.batch import Batch, InProcess, load_batch, schemas
 from tussle.batch.damage import damage_in_batch
-from tussle.batch.finished_runs import FinishedRuns, whole
+from tussle.batch.finished_runs import FinishedRuns
 from tussle.batch.schemas import BATCH
 from tussle.documents import Document
 from tussle.errors import BatchError, RecordError, TussleError
@@ -120,7 +120,7 @@ def test_each_flipped_byte_of_a_document_is_told_or_changes_no_value(run, batche
 def finished(path, design):
     """The results of the runs that are not in the tables yet, and what is told of damage."""
     notes: list[str] = []
-    return whole(FinishedRuns(path, design, notes))[0].to_pylist(), notes
+    return [row for results, _ in FinishedRuns(path, design, notes) for row in results.to_pylist()], notes
 
 
 def test_each_flipped_byte_of_a_batch_is_told(batches):

@@ -16,7 +16,7 @@ from tussle.errors import ParameterError, RecordError
 from tussle.plugins.stock.autonomy.trajectory_record_playback import read_recorded
 from tussle.record.arrow_file import read_batches
 from tussle.record.first_states import read_table
-from tussle.record.parquet_file import read_parquet
+from tussle.record.parquet_file import ParquetTable
 from tussle.record.parquet_sizes import Sizes, sizes_of
 from tussle.record.schema import EVENTS, EVENTS_RULES, TRAJECTORY, TRAJECTORY_RULES
 
@@ -134,7 +134,7 @@ def test_a_long_word_in_many_rows_is_refused(tmp_path):
 def test_a_parquet_table_of_something_else_is_refused(tmp_path, table, said):
     pq.write_table(table, tmp_path / "a.parquet", compression="zstd")
     with pytest.raises(RecordError, match=said):
-        read_parquet(tmp_path / "a.parquet", pa.schema([("run", pa.int64())]), RecordError)
+        ParquetTable(tmp_path / "a.parquet", pa.schema([("run", pa.int64())]), RecordError).read()
 
 
 def test_a_parquet_table_whose_texts_are_a_bomb_is_refused(tmp_path):
@@ -142,9 +142,9 @@ def test_a_parquet_table_whose_texts_are_a_bomb_is_refused(tmp_path):
     pq.write_table(pa.table({"a": text}), tmp_path / "a.parquet", compression="zstd", store_schema=False)
     assert (tmp_path / "a.parquet").stat().st_size < 10_000
     with pytest.raises(RecordError, match="it takes more than"):
-        read_parquet(tmp_path / "a.parquet", pa.schema([]), RecordError)
+        ParquetTable(tmp_path / "a.parquet", pa.schema([]), RecordError).read()
     with pytest.raises(RecordError, match="it has 100,000 rows; the limit is 99,999"):
-        read_parquet(tmp_path / "a.parquet", pa.schema([]), RecordError, most_rows=99_999)
+        ParquetTable(tmp_path / "a.parquet", pa.schema([]), RecordError, most_rows=99_999).read()
 
 
 def test_a_parquet_table_with_one_very_long_list_is_refused(tmp_path):
@@ -152,7 +152,7 @@ def test_a_parquet_table_with_one_very_long_list_is_refused(tmp_path):
     table = pa.table({"a": pa.ListArray.from_arrays(pa.array([0, len(zeros)], pa.int32()), zeros)})
     pq.write_table(table, tmp_path / "a.parquet", compression="zstd")
     with pytest.raises(RecordError, match=r"takes 160,[0-9,]+ bytes"):
-        read_parquet(tmp_path / "a.parquet", pa.schema([]), RecordError)
+        ParquetTable(tmp_path / "a.parquet", pa.schema([]), RecordError).read()
 
 
 def test_a_parquet_table_with_a_very_large_page_is_refused(tmp_path):
@@ -165,7 +165,7 @@ def test_a_parquet_table_with_a_very_large_page_is_refused(tmp_path):
         write_statistics=False,
     )
     with pytest.raises(RecordError, match=r"it has a page of 100,000,[0-9]+ bytes; the limit is 67,108,864"):
-        read_parquet(tmp_path / "a.parquet", pa.schema([]), RecordError)
+        ParquetTable(tmp_path / "a.parquet", pa.schema([]), RecordError).read()
 
 
 def test_the_sizes_of_a_parquet_file_are_those_that_arrow_sees(tmp_path):
@@ -202,7 +202,7 @@ def test_a_parquet_file_that_is_damaged_anywhere_is_read_or_refused(tmp_path):
         for value in (0, 0x7F, 0xFF, whole[place] ^ 0x10):
             path.write_bytes(whole[:place] + bytes([value]) + whole[place + 1 :])
             try:
-                read_parquet(path, pa.schema([("a", pa.int64())]), RecordError, ["a"])
+                ParquetTable(path, pa.schema([("a", pa.int64())]), RecordError, ["a"]).read()
             except RecordError as error:
                 n_refused += 1
                 assert str(error).startswith(str(path))  # noqa: PT017  many are tried

@@ -245,9 +245,8 @@ class Server:
 
     async def _step(self, is_gone: Callable[[], bool], n: int) -> dict[str, Any]:
         check_argument("n", n, COUNT)
-        while n > 0 and not (
-            self._simulation.is_over or is_gone()
-        ):  # who is gone does not step the game of others
+        # A client that is gone does not step the game of others.
+        while n > 0 and not (self._simulation.is_over or is_gone()):
             n -= await self._turned(partial(self._advance, n))
         return self._session.now()
 
